@@ -1,0 +1,79 @@
+"""What a renderer is, and how to open one."""
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Protocol, Self, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from world.errors import InputError
+from world.geometry import Pose
+from world.scene import World
+
+from .eye import Eye
+
+Poses = Float[np.ndarray, "n 3"] | Sequence[Pose]
+Views = UInt8[np.ndarray, "n height width 4"]
+
+BACKENDS = ("auto", "cpu", "egl", "osmesa")
+
+
+@runtime_checkable
+class Renderer(Protocol):
+    """Draws panoramas of one world through one eye.
+
+    backend: what draws: "cpu", "egl" or "osmesa".
+    """
+
+    world: World
+    eye: Eye
+    backend: str
+
+    def render(self, poses: Poses) -> Views:
+        """Panoramas at poses (x [m], y [m], heading [rad]); one pose is a batch of one.
+
+        Colour is the average over each pixel's solid angle, the sky included; alpha is the share of the pixel
+        that something covers (255: all of it, 0: open sky). Raises InputError for poses that are not finite.
+        """
+        ...
+
+    def close(self) -> None:
+        """Free what the renderer holds; using it afterwards is an error."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None: ...
+
+
+def open_renderer(world: World, eye: Eye | None = None, backend: str = "auto") -> Renderer:
+    """Open a renderer; use it in a `with` statement.
+
+    backend: "cpu" (the exact scanline renderer), "egl" or "osmesa" (pyrender), or "auto": the fastest one here, which is
+        the CPU renderer on every machine measured so far (CHANGELOG.md). `Renderer.backend` says which it took.
+    Raises InputError when an explicit choice cannot be had, naming what to install.
+    """
+    eye = eye or Eye()
+    if backend in ("auto", "cpu"):
+        from .scanline import ScanlineRenderer
+
+        return ScanlineRenderer(world, eye)
+    if backend in ("egl", "osmesa"):
+        from .raster import RasterRenderer
+
+        return RasterRenderer(world, eye, backend)
+    raise InputError(f"unknown renderer {backend!r}; the renderers are {', '.join(BACKENDS)}")
+
+
+def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
+    """Poses as a finite (n, 3) float64 array. Raises InputError otherwise."""
+    array = np.asarray(poses, dtype=np.float64)
+    if array.size == 0:
+        array = array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"poses are rows of x, y, heading; got an array of shape {array.shape}")
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise InputError(f"pose {row} is {array[row].tolist()}; a pose needs finite numbers")
+    return array

@@ -1,0 +1,59 @@
+"""The world: coloured triangles, a ground and a sky."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from .errors import InputError
+from .geometry import Bounds
+
+RGB = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A flat rectangle of one colour at z = 0."""
+
+    rgb: RGB
+    bounds: Bounds
+
+
+@dataclass(frozen=True, kw_only=True)
+class World:
+    """Everything there is to see, immutable.
+
+    triangles: (n, 3, 3) corners in metres (triangle, corner, xyz), z up, ground at z = 0.
+    rgb: (n, 3) one colour a triangle.
+    field: where an agent may stand.
+    double_sided: False culls back faces: a triangle is seen only from the side (v1 - v0) x (v2 - v0) points to.
+    origin: how the world was made (preset, seed, parameters), kept through saving and loading.
+    textured: the meshes as read, where they carry textures; the GL renderers draw these.
+    """
+
+    triangles: Float32[np.ndarray, "n 3 3"]
+    rgb: UInt8[np.ndarray, "n 3"]
+    ground: Ground | None
+    sky_rgb: RGB
+    field: Bounds
+    double_sided: bool = True
+    origin: dict[str, Any] = field(default_factory=dict)
+    textured: tuple[Any, ...] = ()
+
+    def __post_init__(self):
+        if not np.isfinite(self.triangles).all():
+            bad = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
+            raise InputError(f"triangle {bad} of the world has a corner that is not finite; repair the mesh")
+        self.triangles.flags.writeable = False
+        self.rgb.flags.writeable = False
+
+    def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
+        """Triangles and colours with the ground's two triangles (facing up) appended: what a renderer draws."""
+        if self.ground is None:
+            return self.triangles, self.rgb
+        x0, y0, x1, y1 = self.ground.bounds
+        a, b, c, d = (x0, y0, 0), (x1, y0, 0), (x1, y1, 0), (x0, y1, 0)
+        triangles = np.array([(a, b, c), (a, c, d)], dtype=np.float32)
+        rgb = np.array([self.ground.rgb] * 2, dtype=np.uint8)
+        return np.concatenate([self.triangles, triangles]), np.concatenate([self.rgb, rgb])
