@@ -1,0 +1,265 @@
+"""The CPU renderer: exact equirectangular scanline rasterisation, no cube map, no GL, no display.
+
+The mathematics, for one eye at the origin. In a column every ray shares one azimuth, so a ray is
+`d = (cos az, sin az, t)` with `t = tan(elevation)`; its length does not matter.
+
+- Coverage. An edge (a, b) of a triangle and the eye span a plane with normal `n = a x b`. A ray passes inside the
+  triangle where `n . d` has the sign of `D = a . (b x c)` for all three edges. Within a column that is linear in t, so
+  each edge bounds t at `-(n_x cos az + n_y sin az) / n_z`, from below or from above by the sign of `n_z D`:
+  the triangle covers the rows between the highest lower and the lowest upper bound. Triangles that share an edge compute
+  the same bound to the last bit, and both own it, so no ray slips between them.
+- Depth. The ray meets the triangle's plane, of normal `N = (b - a) x (c - a)`, at `d D / (N . d)`. So `(N / D) . d` is
+  the inverse of the distance, again linear in t: the depth test is one multiply-add a pixel, and the largest wins.
+
+Nothing is projected or interpolated: every pixel is what a ray caster finds.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import numba
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from world.errors import InputError
+from world.geometry import column_azimuths
+from world.scene import World
+
+from .eye import Eye
+from .renderer import Poses, as_poses
+
+# atan(x) / x as a polynomial in x^2 on [0, 1], within 2e-7: enough to find candidate columns and rows, which exact tests follow.
+_x = np.cos(np.pi * (np.arange(200) + 0.5) / 400)
+_ATAN = tuple(float(c) for c in np.polynomial.polynomial.polyfit(_x**2, np.arctan(_x) / _x, 7))
+_ATAN_ERROR = 1e-6
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _arctan2(y: float, x: float) -> float:
+    """atan2 within _ATAN_ERROR."""
+    ax, ay = abs(x), abs(y)
+    high, low = max(ax, ay), min(ax, ay)
+    if high == 0.0:
+        return 0.0
+    q = low / high
+    s = q * q
+    angle = 0.0
+    for k in range(len(_ATAN) - 1, -1, -1):
+        angle = angle * s + _ATAN[k]
+    angle *= q
+    if ay > ax:
+        angle = 0.5 * np.pi - angle
+    if x < 0.0:
+        angle = np.pi - angle
+    return -angle if y < 0.0 else angle
+
+
+@numba.njit(cache=True, nogil=True)
+def _columns_of(a, b, c, heading, width):
+    """First and last column (unwrapped, may leave 0..width-1) whose centre may look at a triangle with corners a, b, c."""
+    scale = width / (2 * np.pi)
+    pad = 1e-6 + 2 * _ATAN_ERROR * scale
+    ca = (np.pi - (_arctan2(a[1], a[0]) - heading)) * scale - 0.5
+    cb = (np.pi - (_arctan2(b[1], b[0]) - heading)) * scale - 0.5
+    cc = (np.pi - (_arctan2(c[1], c[0]) - heading)) * scale - 0.5
+    ab, bc, ac = cb - ca, cc - cb, cc - ca
+    ab -= width * np.rint(ab / width)
+    bc -= width * np.rint(bc / width)
+    ac -= width * np.rint(ac / width)
+    half = 0.5 * width - pad
+    if abs(ab) > half or abs(bc) > half or abs(ac) > half or abs(ab + bc - ac) > 0.5:
+        return 0, width - 1  # the eye's vertical passes through the triangle, or as good as
+    first = np.ceil(ca + min(0.0, ab, ac) - pad)
+    last = np.floor(ca + max(0.0, ab, ac) + pad)
+    shift = np.floor(first / width) * width
+    return int(first - shift), int(last - shift)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _rows_between(low, high, tangents, top, rows_per_radian):
+    """First and last row whose tan(elevation) lies in [low, high]; first > last where there is none."""
+    last_row = tangents.size - 1
+    if low > tangents[0] or high < tangents[last_row]:
+        return 1, 0
+    first = 0
+    if high < tangents[0]:
+        first = int((top - _arctan2(high, 1.0)) * rows_per_radian)
+        first = min(max(first, 0), last_row)
+        while first > 0 and tangents[first - 1] <= high:
+            first -= 1
+        while tangents[first] > high:
+            first += 1
+    last = last_row
+    if low > tangents[last_row]:
+        last = int((top - _arctan2(low, 1.0)) * rows_per_radian)
+        last = min(max(last, 0), last_row)
+        while last < last_row and tangents[last + 1] >= low:
+            last += 1
+        while tangents[last] < low:
+            last -= 1
+    return first, last
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _draw(triangles, cull, eye, heading, cosines, sines, tangents, top, rows_per_radian, start, stop, nearness, seen):
+    """Draw all triangles into columns start..stop-1: the nearest triangle of each pixel into `seen` (-1: none).
+
+    triangles (n, 3, 3); eye (3,); cosines, sines (width,) of the columns' azimuths in the world; tangents (height,) of the rows'
+    elevations; nearness, seen (width, height): inverse distance and triangle, columns contiguous.
+    """
+    width = cosines.size
+    nearness[start:stop] = 0.0
+    seen[start:stop] = -1
+    a, b, c = np.empty(3), np.empty(3), np.empty(3)
+    p, q = np.empty(3), np.empty(3)  # an edge's bound on t is p cos + q sin
+    side = np.empty(3, np.int64)  # +1: a lower bound, -1: an upper, 0: the edge's plane is vertical, p cos + q sin >= 0 is the test
+    for i in range(triangles.shape[0]):
+        for k in range(3):
+            a[k] = triangles[i, 0, k] - eye[k]
+            b[k] = triangles[i, 1, k] - eye[k]
+            c[k] = triangles[i, 2, k] - eye[k]
+        first, last = _columns_of(a, b, c, heading, width)
+        if first > last or (first >= stop and last < start + width) or (last < start):
+            continue
+        bx, by, bz = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+        volume = a[0] * bx + a[1] * by + a[2] * bz
+        if volume == 0.0 or (cull and volume > 0.0):
+            continue
+        cx, cy, cz = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
+        ax, ay, az = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+        # N = (b - a) x (c - a) is the sum of the three edge normals, but precise only when taken from the differences.
+        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        gx, gy, gz = (uy * vz - uz * vy) / volume, (uz * vx - ux * vz) / volume, (ux * vy - uy * vx) / volume
+        for k, (nx, ny, nz) in enumerate(((ax, ay, az), (bx, by, bz), (cx, cy, cz))):
+            if abs(nz) < 1e-200:
+                sign = 1.0 if volume > 0.0 else -1.0
+                p[k], q[k], side[k] = sign * nx, sign * ny, 0
+            else:
+                p[k], q[k] = -nx / nz, -ny / nz
+                side[k] = 1 if (nz > 0.0) == (volume > 0.0) else -1
+        for column in range(first, last + 1):
+            j = column if column < width else column - width
+            if j < start or j >= stop:
+                continue
+            cos, sin = cosines[j], sines[j]
+            low, high = -np.inf, np.inf
+            for k in range(3):
+                t = p[k] * cos + q[k] * sin
+                if side[k] > 0:
+                    low = max(low, t)
+                elif side[k] < 0:
+                    high = min(high, t)
+                elif t < 0.0:
+                    low = np.inf
+            if low > high:
+                continue
+            r0, r1 = _rows_between(low, high, tangents, top, rows_per_radian)
+            base = gx * cos + gy * sin
+            depth, index = nearness[j], seen[j]
+            for r in range(r0, r1 + 1):
+                near = base + gz * tangents[r]
+                if near > depth[r]:
+                    depth[r] = near
+                    index[r] = i
+
+
+@numba.njit(cache=True, nogil=True)
+def _average(seen, rgb, sky, rays, weights, start, stop, view):
+    """Average the rays of each pixel of columns start..stop-1 into view (height, width, 4), by solid angle.
+
+    seen (width * rays, height * rays); weights (height, rays) sum to 1 / rays over a pixel's sub-rows.
+    """
+    for row in range(view.shape[0]):
+        for column in range(start, stop):
+            red = green = blue = cover = 0.0
+            for y in range(rays):
+                r = g = b = 0
+                hits = 0
+                for x in range(rays):
+                    i = seen[column * rays + x, row * rays + y]
+                    if i >= 0:
+                        r += rgb[i, 0]
+                        g += rgb[i, 1]
+                        b += rgb[i, 2]
+                        hits += 1
+                miss = rays - hits
+                red += weights[row, y] * (r + miss * sky[0])
+                green += weights[row, y] * (g + miss * sky[1])
+                blue += weights[row, y] * (b + miss * sky[2])
+                cover += weights[row, y] * hits
+            view[row, column, 0] = np.uint8(red + 0.5)
+            view[row, column, 1] = np.uint8(green + 0.5)
+            view[row, column, 2] = np.uint8(blue + 0.5)
+            view[row, column, 3] = np.uint8(255.0 * cover + 0.5)
+
+
+class ScanlineRenderer:
+    """Exact panoramas on the CPU (see the module's docstring); a `Renderer`.
+
+    threads: how many to use; None takes every core this process may run on. The result does not depend on it.
+    """
+
+    backend = "cpu"
+
+    def __init__(self, world: World, eye: Eye, threads: int | None = None):
+        self.world = world
+        self.eye = eye
+        triangles, rgb = world.surfaces()
+        self._triangles = np.ascontiguousarray(triangles, dtype=np.float64)
+        self._rgb = rgb
+        self._sky = np.array(world.sky_rgb, dtype=np.float64)
+        rays = eye.rays
+        self._azimuths = column_azimuths(eye.width * rays)
+        elevations = eye.elevations(rays)
+        self._tangents = np.tan(elevations)
+        weights = np.cos(elevations).reshape(eye.height, rays)
+        self._weights = weights / weights.sum(axis=1, keepdims=True) / rays
+        self._threads = threads or len(os.sched_getaffinity(0))
+        self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(self._threads)
+
+    def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width 4"]:
+        """See `Renderer.render`. Poses are shared out among threads; a single pose is cut into strips of columns."""
+        if self._pool is None:
+            raise InputError("this renderer is closed; open another one")
+        poses = as_poses(poses)
+        views = np.empty((len(poses), self.eye.height, self.eye.width, 4), dtype=np.uint8)
+        if len(poses) == 0:
+            return views
+        if len(poses) == 1:
+            edges = np.linspace(0, self.eye.width, self._threads + 1).astype(int)
+            jobs = [(poses, views, int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if a < b]
+        else:
+            shares = np.array_split(np.arange(len(poses)), self._threads)
+            jobs = [(poses[s[0] : s[-1] + 1], views[s[0] : s[-1] + 1], 0, self.eye.width) for s in shares if len(s)]
+        others = [self._pool.submit(self._render_strip, *job) for job in jobs[1:]]
+        self._render_strip(*jobs[0])
+        for other in others:
+            other.result()
+        return views
+
+    def _render_strip(self, poses: Float[np.ndarray, "n 3"], views: np.ndarray, start: int, stop: int) -> None:
+        """Draw columns start..stop-1 of the views at poses."""
+        eye, rays = self.eye, self.eye.rays
+        shape = (eye.width * rays, eye.height * rays)
+        nearness, seen = np.empty(shape), np.empty(shape, dtype=np.int32)
+        rows_per_radian = shape[1] / (eye.top - eye.bottom)
+        for (x, y, heading), view in zip(poses, views, strict=True):
+            azimuths = heading + self._azimuths
+            _draw(
+                self._triangles, not self.world.double_sided, np.array([x, y, eye.z]), heading, np.cos(azimuths), np.sin(azimuths),
+                self._tangents, eye.top, rows_per_radian, start * rays, stop * rays, nearness, seen,
+            )  # fmt: skip
+            _average(seen, self._rgb, self._sky, rays, self._weights, start, stop, view)
+
+    def close(self) -> None:
+        """Stop the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+    def __enter__(self) -> "ScanlineRenderer":
+        return self
+
+    def __exit__(self, kind, error, at) -> None:
+        self.close()
