@@ -1,0 +1,158 @@
+"""The loop: look, scan, turn to the most familiar heading, step."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from render.renderer import Renderer
+from world.errors import InputError
+from world.geometry import Pose, Route, wrap_angle
+
+from .encoding import Encoding
+from .familiarity import FamiliarityModel, SnapshotModel
+from .rotation import best_turn, scan_window
+
+# Why a walk ends. The first is success.
+ARRIVED, LOST, STUCK, OUT_OF_WORLD, OUT_OF_STEPS = "arrived", "lost", "stuck in a loop", "out of the world", "out of steps"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One look around and what came of it.
+
+    index: 0 for the first look. pose: where the agent stands and faces as it looks. view: what it sees, RGBA.
+    familiarity: of every rotation, turned left by 0, 1, .. columns. turn: chosen, noise included (rad, left positive).
+    match: index of the learned view it recognised, None where the model keeps none.
+    deviation: distance from the route (m). along: how far along the route the nearest place is (m).
+    error: how far the chosen heading is from the route's there (rad, -pi..pi).
+    reason: None while the walk goes on, else why it ends. reset: why the agent was put back on the route before this look, or None.
+    """
+
+    index: int
+    pose: Pose
+    view: UInt8[np.ndarray, "height width 4"]
+    familiarity: Float[np.ndarray, " w"]
+    turn: float
+    match: int | None
+    deviation: float
+    along: float
+    error: float
+    reason: str | None
+    reset: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agent:
+    """Follows a route by familiarity.
+
+    step_length (m). scan: width of the scan (rad), about the present heading, or about the world direction `scan_about` (rad).
+    heading_noise: standard deviation of the normal noise on every turn (rad).
+    arrive: the walk is done within this distance of the route's end (m), once half of the route's length has been walked.
+    lost: farther than this from the route is lost (m). patience: metres walked without getting farther along the route before
+    the agent counts as stuck. max_steps: None takes what walks the route three times.
+    reset_when_lost: instead of ending the walk, put a lost, stuck or straying agent back on the route at the waypoint after the
+    furthest one reached, facing along it, as Ardin et al. (2016) count errors.
+    """
+
+    renderer: Renderer
+    encoding: Encoding
+    model: FamiliarityModel
+    route: Route
+    step_length: float = 0.05
+    scan: float = np.pi
+    scan_about: float | None = None
+    heading_noise: float = 0.0
+    arrive: float = 0.15
+    lost: float = 0.5
+    patience: float = 3.0
+    max_steps: int | None = None
+    reset_when_lost: bool = False
+    seed: int = 0
+    waypoint_spacing: float = field(default=0.1)
+
+    def __post_init__(self):
+        for name in ("step_length", "arrive", "lost", "patience", "waypoint_spacing"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"{name.replace('_', ' ')} {value} m; give a finite distance over 0")
+        if not (np.isfinite(self.heading_noise) and self.heading_noise >= 0):
+            raise InputError(f"heading noise {np.degrees(self.heading_noise):g} degrees; give 0 or more")
+        if self.max_steps is not None and self.max_steps < 1:
+            raise InputError(f"at most {self.max_steps} steps; give at least 1")
+
+    @property
+    def step_limit(self) -> int:
+        """The number of steps after which the walk ends."""
+        return self.max_steps or int(np.ceil(3 * self.route.length / self.step_length))
+
+    def start(self, offset: float = 0.0) -> Pose:
+        """The route's first pose, moved `offset` metres to its left (negative: right)."""
+        pose = self.route.start.moved(0.0, offset)
+        self._check_inside(pose)
+        return pose
+
+    def walk(self, start: Pose) -> Iterator[Step]:
+        """Walk from `start` until arrival or failure, a `Step` at a time; the last one has a `reason`."""
+        self._check_inside(start)
+        random = np.random.default_rng(self.seed)
+        pose, reset, furthest, gained_at = start, None, -np.inf, 0
+        for index in range(self.step_limit + 1):
+            view = self.renderer.render([pose])[0]
+            familiarity, match = self._scan(view, pose)
+            turn = match_turn = float(best_turn(familiarity[None], self._window(len(familiarity), pose))[0])
+            turn = float(wrap_angle(turn + self.heading_noise * random.standard_normal()))
+            (deviation,), (along,) = self.route.nearest([pose[:2]])
+            if along > furthest:
+                furthest, gained_at = float(along), index
+            reason = self._reason(index, pose, deviation, index - gained_at)
+            recovering = reason in (LOST, STUCK, OUT_OF_WORLD) and self.reset_when_lost
+            yield Step(
+                index=index, pose=pose, view=view, familiarity=familiarity, turn=turn,
+                match=None if match is None else int(match[round(match_turn / (2 * np.pi) * len(match)) % len(match)]),
+                deviation=float(deviation), along=float(along), reset=reset, reason=None if recovering else reason,
+                error=float(wrap_angle(pose.heading + turn - self.route.at(along)[0, 2])),
+            )  # fmt: skip
+            if recovering:
+                furthest = self._waypoint_after(furthest)
+                pose, reset, gained_at = Pose(*self.route.at(furthest)[0].tolist()), reason, index
+            elif reason:
+                return
+            else:
+                pose, reset = pose.turned(turn).moved(self.step_length), None
+
+    def _scan(self, view: np.ndarray, pose: Pose) -> tuple[np.ndarray, np.ndarray | None]:
+        """Familiarity of every rotation of a view, and which learned view each resembles, if the model knows."""
+        features = self.encoding(view[None])
+        if isinstance(self.model, SnapshotModel):
+            familiarity, match = self.model.match(features)
+            return familiarity[0].numpy(), match[0].numpy()
+        return self.model.scan(features)[0].numpy(), None
+
+    def _window(self, width: int, pose: Pose) -> np.ndarray:
+        centre = 0.0 if self.scan_about is None else float(wrap_angle(self.scan_about - pose.heading))
+        return scan_window(width, self.scan, centre)
+
+    def _reason(self, index: int, pose: Pose, deviation: float, steps_without_gain: int) -> str | None:
+        """Why the walk ends here, or None."""
+        goal = self.route.goal
+        walked = index * self.step_length
+        if np.hypot(pose.x - goal.x, pose.y - goal.y) <= self.arrive and walked >= 0.5 * self.route.length:
+            return ARRIVED
+        if not self.renderer.world.field.contains(pose.x, pose.y):
+            return OUT_OF_WORLD
+        if deviation > self.lost:
+            return LOST
+        if steps_without_gain * self.step_length >= self.patience:
+            return STUCK
+        return OUT_OF_STEPS if index >= self.step_limit else None
+
+    def _waypoint_after(self, along: float) -> float:
+        """Distance along the route of the first waypoint beyond `along`."""
+        return min((np.floor(along / self.waypoint_spacing + 1e-9) + 1) * self.waypoint_spacing, self.route.length)
+
+    def _check_inside(self, pose: Pose) -> None:
+        field = self.renderer.world.field
+        if not np.isfinite(pose).all() or not field.contains(pose.x, pose.y):
+            raise InputError(f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset")

@@ -1,0 +1,176 @@
+"""What an agent keeps of a view: a chain of named steps from a panorama to a feature image.
+
+`Encoding.parse("sky-mask | vertical-edges | resize 3 | normalise")` and `str(encoding)` are each other's inverse. Every step
+treats the panorama as the ring it is, so that turning the eye rolls the feature image (exactly, where the resize
+factor divides the turn and the width).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Float32, UInt8
+
+from world.errors import InputError
+
+Views = UInt8[np.ndarray, "n height width channels"]
+Images = Float32[np.ndarray, "n h w"]
+
+
+@dataclass(frozen=True)
+class Grey:
+    """Brightness, 0..1 (ITU-R BT.601 weights, as OpenCV converts)."""
+
+    word: ClassVar[str] = "grey"
+
+    def __call__(self, views: Views) -> Images:
+        return views[..., :3] @ (np.array([0.299, 0.587, 0.114], dtype=np.float32) / np.float32(255))
+
+
+@dataclass(frozen=True)
+class SkyMask:
+    """Share of each pixel that is not open sky, 0..1: exact where views carry alpha, else estimated from their colours.
+
+    The estimate takes the median colour of the top rows for the sky, and Otsu's threshold on the distance from it.
+    """
+
+    word: ClassVar[str] = "sky-mask"
+
+    def __call__(self, views: Views) -> Images:
+        if views.shape[-1] == 4:
+            return views[..., 3] * np.float32(1 / 255)
+        masks = np.empty(views.shape[:3], dtype=np.float32)
+        for view, mask in zip(views, masks, strict=True):
+            top = view[: max(1, len(view) // 10)].reshape(-1, view.shape[-1])
+            away = np.abs(view.astype(np.int16) - np.median(top, axis=0).astype(np.int16)).max(axis=-1).astype(np.uint8)
+            threshold, _ = cv2.threshold(away, 0, 1, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+            mask[:] = away > threshold
+        return masks
+
+
+@dataclass(frozen=True)
+class Blur:
+    """Gaussian smoothing with a standard deviation of `sigma` pixels; around the ring, mirrored at top and bottom."""
+
+    sigma: float
+    word: ClassVar[str] = "blur"
+
+    def __post_init__(self):
+        if not 0 < self.sigma <= 100:
+            raise InputError(f"blur {self.sigma:g}: give a standard deviation over 0 and up to 100 pixels")
+
+    def __call__(self, images: Images) -> Images:
+        margin = int(np.ceil(4 * self.sigma))
+        wrapped = np.pad(images, ((0, 0), (0, 0), (margin, margin)), mode="wrap")
+        size = 2 * margin + 1
+        blurred = [cv2.GaussianBlur(image, (size, size), self.sigma, borderType=cv2.BORDER_REFLECT) for image in wrapped]
+        return np.stack(blurred)[:, :, margin:-margin] if len(images) else images
+
+
+@dataclass(frozen=True)
+class Resize:
+    """Area average down to 1 / `factor` of the width and height (rounded, at least 4 x 1)."""
+
+    factor: float
+    word: ClassVar[str] = "resize"
+
+    def __post_init__(self):
+        if not 1 <= self.factor <= 1000:
+            raise InputError(f"resize {self.factor:g}: give a factor from 1 (as it is) up to 1000")
+
+    def __call__(self, images: Images) -> Images:
+        n, height, width = images.shape
+        h, w = max(1, round(height / self.factor)), max(4, round(width / self.factor))
+        if (h, w) == (height, width) or n == 0:
+            return images[:, :h, :w]
+        if height % h == 0 and width % w == 0:
+            return images.reshape(n, h, height // h, w, width // w).mean(axis=(2, 4), dtype=np.float32)
+        return np.stack([cv2.resize(image, (w, h), interpolation=cv2.INTER_AREA) for image in images])
+
+
+@dataclass(frozen=True)
+class VerticalEdges:
+    """Strength of vertical edges: the absolute difference between each pixel and its neighbour to the right."""
+
+    word: ClassVar[str] = "vertical-edges"
+
+    def __call__(self, images: Images) -> Images:
+        return np.abs(np.roll(images, -1, axis=-1) - images)
+
+
+@dataclass(frozen=True)
+class Normalise:
+    """Each image shifted to mean 0 and scaled to unit variance (an image without contrast becomes 0)."""
+
+    word: ClassVar[str] = "normalise"
+
+    def __call__(self, images: Images) -> Images:
+        centred = images - images.mean(axis=(1, 2), keepdims=True)
+        deviation = centred.std(axis=(1, 2), keepdims=True)
+        return centred / np.where(deviation > 1e-6, deviation, np.inf)
+
+
+Step = Callable[[np.ndarray], np.ndarray]
+SOURCES = {step.word: step for step in (Grey, SkyMask)}
+FILTERS = {step.word: step for step in (Blur, Resize, VerticalEdges, Normalise)}
+PRESETS = {
+    "grey": "grey | {blur}{resize}",
+    "sky": "sky-mask | {blur}{resize}normalise",
+    "edges": "sky-mask | {blur}vertical-edges | {resize}normalise",
+}
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """A chain of steps, applied in order: one source (grey or sky-mask), then any number of filters."""
+
+    steps: tuple[Step, ...]
+
+    def __call__(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
+        """Feature images of views (n, height, width, 3 or 4) uint8."""
+        if views.ndim != 4 or views.shape[-1] not in (3, 4) or views.dtype != np.uint8:
+            raise InputError(f"views are (n, height, width, 3 or 4) uint8, got {views.shape} {views.dtype}")
+        images = views
+        for step in self.steps:
+            images = step(images)
+        return torch.from_numpy(np.ascontiguousarray(images, dtype=np.float32))
+
+    def __str__(self) -> str:
+        return " | ".join(" ".join([step.word, *(f"{getattr(step, f.name):g}" for f in fields(step))]) for step in self.steps)
+
+    @classmethod
+    def parse(cls, text: str) -> "Encoding":
+        """The encoding that `text` spells: steps separated by `|`, each a word and its number if it takes one."""
+        steps = []
+        for place, part in enumerate(text.split("|")):
+            word, *numbers = part.split() or [""]
+            known = SOURCES if place == 0 else FILTERS
+            if word not in known:
+                kind = "start" if place == 0 else "go on"
+                raise InputError(f"encoding {text!r}: it cannot {kind} with {word!r}; known here: {', '.join(known)}")
+            takes = len(fields(known[word]))
+            try:
+                values = [float(number) for number in numbers]
+            except ValueError:
+                values = []
+            if len(values) != takes or len(numbers) != takes:
+                raise InputError(f"encoding {text!r}: {word} takes {takes or 'no'} number{'s' * (takes != 1)}, got {part.strip()!r}")
+            steps.append(known[word](*values))
+        return cls(tuple(steps))
+
+    @classmethod
+    def named(cls, name: str, resize: float = 1.0, blur: float = 0.0) -> "Encoding":
+        """A preset (grey, sky, edges) with its blur (pixels of the view) and resize factor, or a chain spelled out in full."""
+        if "|" in name:
+            if resize != 1 or blur != 0:
+                raise InputError(f"encoding {name!r} is spelled out: put resize and blur into it instead of beside it")
+            return cls.parse(name)
+        if name not in PRESETS:
+            raise InputError(f"unknown encoding {name!r}; known: {', '.join(PRESETS)}, or a chain such as '{PRESETS['grey'][:7]}resize 6'")
+        text = PRESETS[name].format(
+            blur=f"blur {blur:g} | " if blur else "", resize=f"resize {resize:g} | " if resize != 1 else ""
+        )
+        return cls.parse(text.rstrip(" |"))

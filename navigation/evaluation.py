@@ -1,0 +1,86 @@
+"""How well a model recovers headings: pure functions from worlds and models to numbers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from render.renderer import Renderer
+from world.errors import InputError
+from world.geometry import Bounds, Route, wrap_angle
+
+from .encoding import Encoding
+from .familiarity import FamiliarityModel
+from .rotation import best_turn, scan_window
+
+BATCH = 64  # views rendered, encoded and scored at once
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadingErrors:
+    """Recovered headings at positions beside a route, and how far off they are (equations 2 and 3 of the thesis).
+
+    positions: (n, 2) m. headings: recovered (rad). nearest: index of the nearest route view (place recognition, 4.3.2), whose
+    heading is the set one. errors: absolute difference between the two (rad, 0..pi).
+    """
+
+    positions: Float[np.ndarray, "n 2"]
+    headings: Float[np.ndarray, " n"]
+    nearest: np.ndarray
+    errors: Float[np.ndarray, " n"]
+
+    @property
+    def median_error_deg(self) -> float:
+        return float(np.median(np.degrees(self.errors)))
+
+    @property
+    def mean_error_deg(self) -> float:
+        return float(np.mean(np.degrees(self.errors)))
+
+    @property
+    def share_over_45(self) -> float:
+        return float(np.mean(np.degrees(self.errors) > 45))
+
+
+def grid_positions(route: Route, *, grid: float, within: float, field: Bounds) -> Float[np.ndarray, "n 2"]:
+    """The multiples of `grid` (m) in both axes that lie within `within` (m) of the route and inside the field."""
+    if not (np.isfinite(grid) and grid > 0):
+        raise InputError(f"a grid of {grid} m; give a spacing over 0")
+    low = np.ceil((route.xy.min(axis=0) - within) / grid).astype(int)
+    high = np.floor((route.xy.max(axis=0) + within) / grid).astype(int)
+    if (high - low + 1).prod() > 10**7:
+        raise InputError(f"a grid of {grid:g} m has over ten million positions around this route; give a wider one")
+    x, y = np.meshgrid(np.arange(low[0], high[0] + 1) * grid, np.arange(low[1], high[1] + 1) * grid)
+    xy = np.column_stack([x.ravel(), y.ravel()])
+    distance, _ = route.nearest(xy) if len(xy) else (np.empty(0), None)
+    xy = xy[(distance <= within) & field.contains(xy[:, 0], xy[:, 1])]
+    if len(xy) == 0:
+        raise InputError(f"no multiple of {grid:g} m lies within {within:g} m of the route; give a finer grid or more room")
+    return xy
+
+
+def nearest_view(route: Route, positions: Float[np.ndarray, "n 2"]) -> np.ndarray:
+    """Index of the route view nearest to each position: the thesis's place recognition (4.3.2)."""
+    return np.hypot(*(positions[:, None] - route.xy).transpose(2, 0, 1)).argmin(axis=1)
+
+
+def heading_errors(
+    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, route: Route, positions: Float[np.ndarray, "n 2"],
+    *, scan: float = 2 * np.pi, interpolate: bool = True, progress=lambda done, total: None,
+) -> HeadingErrors:  # fmt: skip
+    """Let a trained model recover the heading at each position and compare it with the nearest route view's.
+
+    scan: width of the scan (rad), about the set heading where it is not full. progress(done, total) is called now and then.
+    """
+    nearest = nearest_view(route, positions)
+    wanted = route.poses[nearest, 2]
+    headings = np.empty(len(positions))
+    for start in range(0, len(positions), BATCH):
+        part = slice(start, start + BATCH)
+        # All views face east, so that the answer is not on the grid of rotations by construction.
+        views = renderer.render(np.column_stack([positions[part], np.zeros(len(positions[part]))]))
+        familiarity = model.scan(encoding(views)).numpy()
+        windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted[part]])
+        headings[part] = best_turn(familiarity, windows, interpolate)
+        progress(min(start + BATCH, len(positions)), len(positions))
+    return HeadingErrors(positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted)))

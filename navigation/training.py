@@ -1,0 +1,40 @@
+"""Where the training views are taken: along the route, and on a learning walk beside it."""
+
+import numpy as np
+from jaxtyping import Float
+
+from world.errors import InputError
+from world.geometry import Bounds, Route, wrap_angle
+
+AHEAD = 0.3  # m; how far ahead on the route a view taken beside it faces
+SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
+
+
+def training_poses(route: Route, *, every: int = 1, learning_walk: float = 0.0, field: Bounds | None = None) -> Float[np.ndarray, "n 3"]:
+    """Poses to learn from: every `every`-th of the route's, and, beside each, those of a learning walk.
+
+    learning_walk: reach to both sides (m); 0 is training on the route only, as the thesis does. Views taken on the route face
+    along it. Views beside it face a point of the route AHEAD of there, so that following them leads back to the route: on the
+    route only, the recovered heading is parallel to it and displacement adds up. Poses outside `field` are left out.
+    """
+    if every < 1:
+        raise InputError(f"every {every}; give 1 for every view, 6 for one in six")
+    if not (np.isfinite(learning_walk) and learning_walk >= 0):
+        raise InputError(f"a learning walk of {learning_walk} m; give 0 (none) or a reach in metres")
+    poses = route.poses[::every]
+    if learning_walk == 0:
+        return poses
+    heading = poses[:, 2]
+    left = np.column_stack([-np.sin(heading), np.cos(heading)])
+    ahead = route.at(route.arc[::every] + AHEAD)[:, :2]
+    batches = [poses]
+    for share in SIDES:
+        for side in (1, -1):
+            xy = poses[:, :2] + side * share * learning_walk * left
+            aim = ahead - xy
+            batches.append(np.column_stack([xy, np.arctan2(aim[:, 1], aim[:, 0])]))
+    every_pose = np.stack(batches, axis=1).reshape(-1, 3)  # in the order of the route
+    every_pose[:, 2] = wrap_angle(every_pose[:, 2])
+    if field is not None:
+        every_pose = every_pose[field.contains(every_pose[:, 0], every_pose[:, 1])]
+    return every_pose

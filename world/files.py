@@ -1,0 +1,278 @@
+"""Worlds and routes on disk: meshes through trimesh, AntWorld `.bin`, routes as CSV.
+
+A world saved as GLB or PLY carries its ground, sky, field, seed and parameters in the file (GLB: the scene's `extras`;
+PLY: a header comment), and reads back equal. Coordinates are metres with z up, in every format, as they stand in the file.
+"""
+
+import csv
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float32, UInt8
+
+from .errors import InputError
+from .geometry import Bounds, Route
+from .scene import Ground, World
+
+KEY = "tussock"  # under which a file carries what a mesh cannot hold
+DEFAULT_SKY = (191, 191, 191)
+
+# How the original program draws its worlds: green vegetation on sand (sussex/README.md has the frames it drew).
+ANTWORLD_TINT = (0.0, 1.0, 0.0)
+ANTWORLD_GROUND = (229, 183, 90)
+ROUTE_HEADER = ["x_m", "y_m", "heading_deg"]
+
+
+@contextmanager
+def replacing(path: str | os.PathLike) -> Iterator[Path]:
+    """A temporary path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not."""
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give the name of a file to write")
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written: there is no folder {path.parent}; create it first")
+    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_world(path: str | os.PathLike) -> World:
+    """Read a world: `.bin` (AntWorld) or any mesh trimesh reads; GLB and PLY written by `write_world` come back whole.
+
+    Raises InputError where the file is missing, damaged, or holds no triangles.
+    """
+    path = _existing(path, "world")
+    if path.suffix.lower() == ".bin":
+        return _read_antworld(path)
+    import trimesh  # late: half a second that a generated world does not need
+
+    if path.suffix.lower().lstrip(".") not in trimesh.available_formats():
+        raise InputError(f"{path}: unknown kind of world {path.suffix!r}; give .glb, .ply, .obj, .stl or AntWorld .bin")
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    except Exception as error:  # trimesh's readers raise whatever their parsers do
+        raise InputError(f"{path} cannot be read as a mesh ({_reason(error)}); is it complete?") from error
+    if not meshes:
+        raise InputError(f"{path} holds no triangles; a world needs some")
+    kept = scene.metadata.get(KEY) if path.suffix.lower() != ".ply" else _read_ply_comment(path)
+    triangles = np.concatenate([mesh.triangles for mesh in meshes]).astype(np.float32)
+    rgb = np.concatenate([_face_rgb(mesh) for mesh in meshes])
+    textured = tuple(meshes) if any(_texture(mesh) is not None for mesh in meshes) else ()
+    if kept is None:
+        corners = triangles.reshape(-1, 3)[:, :2].astype(float)
+        field = Bounds(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+        return World(triangles=triangles, rgb=rgb, ground=None, sky_rgb=DEFAULT_SKY, field=field, textured=textured)
+    try:
+        return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(kept))
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: its {KEY} metadata cannot be used ({_reason(error)}); write the world again") from error
+
+
+def write_world(world: World, path: str | os.PathLike) -> None:
+    """Write a world as `.glb` or `.ply`, nothing lost. The same world gives the same bytes.
+
+    Raises InputError for another ending, and for a textured world as PLY, which cannot hold textures.
+    """
+    import trimesh
+
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in (".glb", ".ply"):
+        raise InputError(f"{path}: a world is written as .glb or .ply, not {suffix or 'a name without an ending'!r}")
+    if suffix == ".ply" and world.textured:
+        raise InputError(f"{path}: a .ply cannot hold this world's textures; write it as .glb")
+    n = len(world.triangles)
+    rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
+    mesh = trimesh.Trimesh(
+        world.triangles.reshape(-1, 3), np.arange(3 * n).reshape(n, 3), vertex_colors=np.repeat(rgba, 3, axis=0), process=False
+    )
+    if suffix == ".glb":
+        scene = trimesh.Scene(list(world.textured) or [mesh])
+        scene.metadata[KEY] = _to_json(world)
+        data = scene.export(file_type="glb")
+    else:
+        data = mesh.export(file_type="ply")
+        head, first_element, rest = data.partition(b"element vertex")
+        data = head + f"comment {KEY} {json.dumps(_to_json(world))}\n".encode("ascii") + first_element + rest
+    with replacing(path) as partial:
+        partial.write_bytes(data)
+
+
+def read_route(path: str | os.PathLike) -> Route:
+    """Read a route: CSV with columns x_m, y_m and (optional) heading_deg, or AntWorld `.bin`.
+
+    Without a heading column each point heads towards the next. Raises InputError naming the line that cannot be used.
+    """
+    path = _existing(path, "route")
+    suffix = path.suffix.lower()
+    if suffix not in (".csv", ".bin"):
+        raise InputError(f"{path}: unknown kind of route {suffix!r}; give .csv ({','.join(ROUTE_HEADER)}) or AntWorld .bin")
+    try:
+        if suffix == ".csv":
+            return _read_route_csv(path)
+        x, y, heading = _read_planes(path, 3, "an AntWorld route")
+        return Route(np.column_stack([x / 100, y / 100, np.radians(heading)]))
+    except InputError as error:
+        message = str(error)
+        raise error if message.startswith(str(path)) else InputError(f"{path}: {message}") from error
+
+
+def write_route(route: Route, path: str | os.PathLike) -> None:
+    """Write a route as CSV (x_m, y_m, heading_deg)."""
+    if Path(path).suffix.lower() != ".csv":
+        raise InputError(f"{path}: a route is written as .csv")
+    rows = np.column_stack([route.xy, np.degrees(route.poses[:, 2])]).tolist()
+    with replacing(path) as partial, partial.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(ROUTE_HEADER)
+        writer.writerows(rows)
+
+
+def _existing(path: str | os.PathLike, kind: str) -> Path:
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"there is no {kind} file {path}; check the name")
+    return path
+
+
+def _reason(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:160]
+
+
+def _read_planes(path: Path, planes: int, what: str) -> Float[np.ndarray, "planes n"]:
+    """The `planes` consecutive arrays of little-endian float64 that an AntWorld file is."""
+    size = path.stat().st_size
+    if size == 0 or size % (8 * planes):
+        raise InputError(f"{path} has {size} bytes; {what} has a multiple of {8 * planes} (is it truncated?)")
+    return np.fromfile(path, dtype="<f8").reshape(planes, -1)
+
+
+def _read_antworld(path: Path) -> World:
+    """An AntWorld `.bin`: planes x0 x1 x2 y0 y1 y2 z0 z1 z2 R G B, drawn in green on sand as its own program does."""
+    planes = _read_planes(path, 12, "an AntWorld world")
+    bad = np.flatnonzero(~np.isfinite(planes).all(axis=0))
+    if len(bad):
+        raise InputError(f"{path}: triangle {bad[0]} holds a number that is not finite; a world needs finite metres and colours")
+    shade = planes[9:]
+    if shade.min() < 0 or shade.max() > 1:
+        raise InputError(f"{path}: colours run from {shade.min():g} to {shade.max():g}; an AntWorld world has 0..1 (is it a world?)")
+    triangles = planes[:9].reshape(3, 3, -1).transpose(2, 1, 0)  # (xyz, corner, n) -> (n, corner, xyz)
+    rgb = np.rint(255 * shade.T * ANTWORLD_TINT).astype(np.uint8)
+    (x0, y0), (x1, y1) = triangles[..., :2].min(axis=(0, 1)).tolist(), triangles[..., :2].max(axis=(0, 1)).tolist()
+    bounds = Bounds(x0, y0, x1, y1)
+    return World(
+        triangles=np.ascontiguousarray(triangles, dtype=np.float32), rgb=rgb, ground=Ground(ANTWORLD_GROUND, bounds),
+        sky_rgb=DEFAULT_SKY, field=bounds,
+    )  # fmt: skip
+
+
+def _read_route_csv(path: Path) -> Route:
+    with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
+        reader = csv.reader(file, skipinitialspace=True)
+        header = [name.strip() for name in next(reader, [])]
+        columns = [name for name in ROUTE_HEADER if name in header]
+        if columns[:2] != ROUTE_HEADER[:2]:
+            raise InputError(f"{path}, line 1: the columns are {','.join(header)!r}; a route needs {','.join(ROUTE_HEADER)}")
+        rows = []
+        for cells in reader:
+            if not any(cell.strip() for cell in cells):
+                continue
+            row = dict(zip(header, cells, strict=False))
+            rows.append([_number(row.get(name, ""), name, path, reader.line_num) for name in columns])
+    if len(rows) < 2:
+        raise InputError(f"{path} holds {len(rows)} point(s); a route needs at least 2")
+    table = np.array(rows)
+    if len(columns) == 2:
+        return Route.through(table)
+    return Route(np.column_stack([table[:, :2], np.radians(table[:, 2])]))
+
+
+def _number(cell: str, name: str, path: Path, line: int) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        unit = "degrees" if name == "heading_deg" else "metres"
+        raise InputError(f"{path}, line {line}: {name} is {cell!r}; a route needs finite {unit}")
+    return value
+
+
+def _to_json(world: World) -> dict[str, Any]:
+    ground = world.ground and {"rgb": list(world.ground.rgb), "bounds": list(world.ground.bounds)}
+    return {
+        "version": 1, "ground": ground, "sky_rgb": list(world.sky_rgb), "field": list(world.field),
+        "double_sided": world.double_sided, "origin": world.origin,
+    }  # fmt: skip
+
+
+def _from_json(kept: dict[str, Any]) -> dict[str, Any]:
+    if kept["version"] != 1:
+        raise InputError(f"written by a newer version ({kept['version']})")
+    ground = kept["ground"]
+    return {
+        "ground": ground and Ground(tuple(ground["rgb"]), Bounds(*ground["bounds"])), "sky_rgb": tuple(kept["sky_rgb"]),
+        "field": Bounds(*kept["field"]), "double_sided": bool(kept["double_sided"]), "origin": dict(kept["origin"]),
+    }  # fmt: skip
+
+
+def _read_ply_comment(path: Path) -> dict[str, Any] | None:
+    """What `write_world` left in a PLY's header, or None."""
+    start = f"comment {KEY} ".encode("ascii")
+    with path.open("rb") as file:
+        for line in file:
+            if line.startswith(start):
+                try:
+                    return json.loads(line[len(start) :])
+                except ValueError as error:
+                    raise InputError(f"{path}: its {KEY} comment is damaged; write the world again") from error
+            if line.startswith(b"end_header"):
+                break
+    return None
+
+
+def _texture(mesh) -> Any:
+    """The image a mesh is textured with, or None."""
+    if mesh.visual.kind != "texture" or mesh.visual.uv is None:
+        return None
+    material = mesh.visual.material
+    image = getattr(material, "baseColorTexture", None)
+    return image if image is not None else getattr(material, "image", None)
+
+
+def _face_rgb(mesh) -> UInt8[np.ndarray, "n 3"]:
+    """One colour a triangle: its own, the mean of its corners', or the mean of its texture over it."""
+    image = _texture(mesh)
+    if image is not None:
+        return _mean_of_texture(np.asarray(image.convert("RGB")), mesh.visual.uv[mesh.faces].astype(np.float32))
+    if mesh.visual.kind == "texture":
+        return np.tile(np.asarray(mesh.visual.material.main_color[:3], dtype=np.uint8), (len(mesh.faces), 1))
+    if mesh.visual.kind == "vertex":
+        corners = np.asarray(mesh.visual.vertex_colors)[mesh.faces, :3]
+        return np.rint(corners.mean(axis=1)).astype(np.uint8)
+    return np.asarray(mesh.visual.face_colors)[:, :3].astype(np.uint8)
+
+
+def _mean_of_texture(image: UInt8[np.ndarray, "h w 3"], uv: Float32[np.ndarray, "n 3 2"], side: int = 16) -> UInt8[np.ndarray, "n 3"]:
+    """Mean colour of an image over triangles in texture space (u right, v up, both wrapping), from side^2 places in each."""
+    steps = (np.arange(side) + 0.5) / side
+    u, v = (grid.ravel() for grid in np.meshgrid(steps, steps))
+    corner = np.where(u + v > 1, [1 - u, 1 - v], [u, v]).astype(np.float32)  # the square folded onto the triangle
+    weights = np.stack([1 - corner.sum(axis=0), *corner])  # (3, side^2)
+    total = np.zeros((len(uv), 3))
+    height, width = image.shape[:2]
+    for place in weights.T:
+        at = np.tensordot(uv, place, axes=(1, 0))  # (n, 2)
+        x = np.floor(at[:, 0] % 1 * width).astype(int).clip(0, width - 1)
+        y = np.floor((1 - at[:, 1]) % 1 * height).astype(int).clip(0, height - 1)
+        total += image[y, x]
+    return np.rint(total / side**2).astype(np.uint8)
