@@ -1,6 +1,6 @@
 """What a familiarity model is."""
 
-from typing import Protocol, Self, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import torch
 from jaxtyping import Float32, Int64
@@ -17,7 +17,7 @@ class FamiliarityModel(Protocol):
     Views are feature images (n, h, w) as an `Encoding` makes them; for training they face along the route.
     """
 
-    def fit(self, views: Images) -> Self:
+    def fit(self, views: Images) -> "FamiliarityModel":
         """Learn the views (forgetting earlier ones). Raises InputError for none, or for values that are not finite."""
         ...
 

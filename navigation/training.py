@@ -1,13 +1,23 @@
-"""Where the training views are taken: along the route, and on a learning walk beside it."""
+"""Learning a route: where its training views are taken, and giving them to a model."""
+
+from collections.abc import Callable
 
 import numpy as np
+import torch
 from jaxtyping import Float
+
+from render.renderer import Renderer
 
 from world.errors import InputError
 from world.geometry import Bounds, Route, wrap_angle
 
+from .encoding import Encoding
+from .familiarity import FamiliarityModel
+
 AHEAD = 0.3  # m; how far ahead on the route a view taken beside it faces
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
+BATCH = 64  # views rendered and encoded at once
+BLANK = 1e-3  # standard deviation under which a feature image holds nothing to recognise
 
 
 def training_poses(route: Route, *, every: int = 1, learning_walk: float = 0.0, field: Bounds | None = None) -> Float[np.ndarray, "n 3"]:
@@ -38,3 +48,27 @@ def training_poses(route: Route, *, every: int = 1, learning_walk: float = 0.0, 
     if field is not None:
         every_pose = every_pose[field.contains(every_pose[:, 0], every_pose[:, 1])]
     return every_pose
+
+
+def learn(
+    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"],
+    progress: Callable[[int, int], object] = lambda done, total: None,
+) -> Float[np.ndarray, "m 3"]:  # fmt: skip
+    """Fit the model to the views at poses; return the poses whose views it learned.
+
+    A view without contrast, as an eye has whose view a plant covers altogether, is left out: it holds nothing to recognise, yet after
+    normalising it lies nearer to every view than most true matches do. progress(done, total) is called after each batch.
+    Raises InputError when no view is left.
+    """
+    images, kept = [], []
+    for start in range(0, len(poses), BATCH):
+        part = poses[start : start + BATCH]
+        batch = encoding(renderer.render(part))
+        seen = batch.flatten(start_dim=1).std(dim=1, correction=0) > BLANK
+        images.append(batch[seen])
+        kept.append(part[seen.numpy()])
+        progress(min(start + BATCH, len(poses)), len(poses))
+    if not sum(map(len, kept)):
+        raise InputError(f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})")
+    model.fit(torch.cat(images))
+    return np.concatenate(kept)

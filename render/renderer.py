@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Protocol, Self, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -42,7 +42,7 @@ class Renderer(Protocol):
         """Free what the renderer holds; using it afterwards is an error."""
         ...
 
-    def __enter__(self) -> Self: ...
+    def __enter__(self) -> "Renderer": ...
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None: ...
 

@@ -1,13 +1,16 @@
 """The world: coloured triangles, a ground and a sky."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float32, UInt8
 
 from .errors import InputError
 from .geometry import Bounds
+
+if TYPE_CHECKING:
+    from .generate import WorldParams
 
 RGB = tuple[int, int, int]
 
@@ -47,6 +50,20 @@ class World:
             raise InputError(f"triangle {bad} of the world has a corner that is not finite; repair the mesh")
         self.triangles.flags.writeable = False
         self.rgb.flags.writeable = False
+
+    @classmethod
+    def generate(cls, params: "WorldParams | str" = "tussock-field", seed: int = 0) -> "World":
+        """Grow a world from parameters, or from a preset by its name. The same seed gives the same bytes.
+
+        Raises InputError for an unknown preset (lists the known) or a seed that is no whole number from 0.
+        """
+        from .generate import PRESETS, generate_world
+
+        if isinstance(params, str):
+            if params not in PRESETS:
+                raise InputError(f"unknown preset {params!r}; known: {', '.join(PRESETS)}")
+            params = PRESETS[params]
+        return generate_world(params, seed)
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
         """Triangles and colours with the ground's two triangles (facing up) appended: what a renderer draws."""

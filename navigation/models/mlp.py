@@ -1,7 +1,5 @@
 """The thesis's classifier (section 4.4): a multi-layer perceptron that tells views along the route from turned ones."""
 
-from typing import Self
-
 import numpy as np
 import torch
 from jaxtyping import Float32
@@ -30,7 +28,7 @@ class MLP:
         self.seed = seed
         self.shape: tuple[int, ...] | None = None
 
-    def fit(self, views: Images) -> Self:
+    def fit(self, views: Images) -> "MLP":
         """Train from scratch on the views and their turned copies."""
         check_training(views)
         random = torch.Generator().manual_seed(self.seed)

@@ -1,7 +1,5 @@
 """Perfect memory: keep every view of the route, recognise the nearest (Zeil et al. 2003; Baddeley et al. 2012; thesis 4.3)."""
 
-from typing import Self
-
 import torch
 from jaxtyping import Float32, Int64
 
@@ -18,7 +16,7 @@ class PerfectMemory:
     def __init__(self):
         self.snapshots: Float32[torch.Tensor, "m h w"] | None = None
 
-    def fit(self, views: Images) -> Self:
+    def fit(self, views: Images) -> "PerfectMemory":
         """Store the views."""
         check_training(views)
         self.snapshots = views.clone()

@@ -1,0 +1,43 @@
+# What a person types. Everything happens in .venv; nothing else on the machine is touched.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
+
+.PHONY: run test lint format bench clean
+
+run: $(VENV)/installed  ## install, grow a world, learn a route, walk it home, say how to watch it
+	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
+	$(BIN)/tussock run --world world.glb --seed 7 --offset-m 0.1 --out run --overwrite
+	@echo
+	@echo "The agent's walk is in the folder run: look at run/overview.png, or watch it with"
+	@echo "    $(BIN)/tussock play run          (a window)"
+	@echo "    $(BIN)/tussock play run --web    (a browser, where there is no display)"
+
+test: $(VENV)/developer  ## all tests
+	$(BIN)/pytest
+
+lint: $(VENV)/developer  ## style, types, and which room may know which
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: $(VENV)/developer
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/developer  ## what things cost here, beside the naive way
+	$(BIN)/python benchmarks/bench.py
+
+$(VENV)/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) -e .
+	touch $@
+
+$(VENV)/developer: $(VENV)/installed
+	$(PIP) -e '.[dev]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) run world.glb world.png

@@ -1,0 +1,166 @@
+"""Walks as rerun recordings. The only module that imports rerun.
+
+A recorder consumes steps as they come and streams them to disk, so the loop knows nothing of it and a crash leaves a
+recording that opens up to the crash. The blueprint travels inside the file: opening it needs no clicking.
+"""
+
+import socket
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from jaxtyping import Float
+
+from render.renderer import Renderer
+from world.errors import InputError
+from world.geometry import Route, turn_of_columns
+from world.scene import World
+
+from .agent import Step
+
+VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
+TIMELINE = "step"
+
+ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
+ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
+
+
+class Recording:
+    """A `.rrd` file being written; use it in a `with` statement and `log` each step.
+
+    renderer, training_poses: draw the learned view that was recognised beside the present one (None: not shown).
+    lost: deviation (m) to which its plot reaches. live: the address of a running viewer to stream to as well, or None.
+    title: shown with the recording, markdown.
+    """
+
+    def __init__(
+        self, path: Path, world: World, route: Route, *, renderer: Renderer | None = None,
+        training_poses: Float[np.ndarray, "n 3"] | None = None, lost: float = 0.5, live: str | None = None, title: str = "",
+    ):  # fmt: skip
+        self._renderer, self._training_poses = renderer, training_poses
+        self._previous: Step | None = None
+        self._stream = rr.RecordingStream("tussock")
+        blueprint = _blueprint(route, lost)
+        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(path))]
+        if live is not None:
+            check_viewer(live)
+            sinks.append(rr.GrpcSink(live))
+        self._stream.set_sinks(*sinks, default_blueprint=blueprint)
+        self._log_surroundings(world, route, title)
+
+    def log(self, step: Step) -> None:
+        """Add one step."""
+        stream, pose = self._stream, step.pose
+        stream.set_time(TIMELINE, sequence=step.index)
+        here = [pose.x, pose.y, ABOVE]
+        stream.log("world/agent", rr.Arrows3D(origins=[here], vectors=[_direction(pose.heading + step.turn, 0.2)], colors=PATH_COLOUR, radii=0.012))
+        if self._previous is not None and step.reset is None:
+            before = self._previous.pose
+            stream.log("world/path", rr.LineStrips3D([[[before.x, before.y, ABOVE], here]], colors=PATH_COLOUR, radii=0.008))
+        stream.log("view", rr.Image(step.view[..., :3]))
+        self._log_match(step)
+        width = len(step.familiarity)
+        order = np.argsort(-turn_of_columns(np.arange(width), width))
+        degrees_right = -np.degrees(turn_of_columns(order, width))
+        # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
+        stream.log("familiarity", rr.BarChart(step.familiarity[order] - step.familiarity.min(), abscissa=degrees_right, color=MATCH_COLOUR))
+        stream.log("deviation/m", rr.Scalars(step.deviation))
+        stream.log("error/degrees", rr.Scalars(np.degrees(step.error)))
+        event = step.reason or (step.reset and f"{step.reset}: put back on the route")
+        if event:
+            level = rr.TextLogLevel.INFO if step.reason == "arrived" else rr.TextLogLevel.WARN
+            stream.log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
+        self._previous = step
+
+    def close(self) -> None:
+        """Write what is left and close the file."""
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(self, kind, error, at) -> None:
+        self.close()
+
+    def _log_surroundings(self, world: World, route: Route, title: str) -> None:
+        """What does not change: the world, the route, where views were learned, the axes' names."""
+        log = self._stream.log
+        log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        triangles, rgb = world.surfaces()
+        colours = np.repeat(rgb, 3, axis=0)
+        mesh = rr.Mesh3D(vertex_positions=triangles.reshape(-1, 3), vertex_colors=colours, vertex_normals=_up(len(colours)))
+        log("world/mesh", mesh, static=True)
+        strip = np.column_stack([route.xy, np.full(len(route.xy), ABOVE)])
+        log("world/route", rr.LineStrips3D([strip], colors=ROUTE_COLOUR, radii=0.008), static=True)
+        goal = [*route.xy[-1], ABOVE]
+        log("world/goal", rr.Points3D([goal], colors=ROUTE_COLOUR, radii=0.06, labels=["goal"], show_labels=True), static=True)
+        if self._training_poses is not None:
+            points = np.column_stack([self._training_poses[:, :2], np.full(len(self._training_poses), ABOVE)])
+            log("world/learned_views", rr.Points3D(points, colors=LEARNED_COLOUR, radii=0.006), static=True)
+        log("deviation/m", rr.SeriesLines(names="deviation from the route (m)", colors=PATH_COLOUR), static=True)
+        log("error/degrees", rr.SeriesLines(names="heading error (degrees)", colors=MATCH_COLOUR), static=True)
+        if title:
+            log("about", rr.TextDocument(title, media_type="text/markdown"), static=True)
+
+    def _log_match(self, step: Step) -> None:
+        """The learned view that was recognised, and where it was learned."""
+        if step.match is None or self._training_poses is None or self._renderer is None:
+            return
+        x, y, heading = self._training_poses[step.match]
+        self._stream.log("recognised", rr.Image(self._renderer.render(self._training_poses[[step.match]])[0, ..., :3]))
+        arrow = rr.Arrows3D(origins=[[x, y, ABOVE]], vectors=[_direction(heading, 0.15)], colors=MATCH_COLOUR, radii=0.008)
+        self._stream.log("world/recognised", arrow)
+
+
+def check_viewer(url: str) -> None:
+    """Raise InputError where no viewer listens."""
+    at = urlsplit(url)
+    try:
+        socket.create_connection((at.hostname or "", at.port or 9876), timeout=2).close()
+    except (OSError, ValueError) as error:
+        raise InputError(f"no rerun viewer listens at {url}; start one with: rerun --bind 127.0.0.1") from error
+
+
+def _direction(heading: float, length: float) -> list[float]:
+    return [length * np.cos(heading), length * np.sin(heading), 0.0]
+
+
+def _up(n: int) -> np.ndarray:
+    """Normals that all point up: the triangles' colours carry their shading already, and every one is lit alike."""
+    return np.tile(np.array([0, 0, 1], dtype=np.float32), (n, 1))
+
+
+def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
+    """Where things are shown: the world to the left, what the agent sees and thinks to the right."""
+    middle = (route.xy.min(axis=0) + route.xy.max(axis=0)) / 2
+    reach = max(float(np.ptp(route.xy, axis=0).max()), 1.0)
+    so_far = rrb.VisibleTimeRanges(timeline=TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative())
+    world = rrb.Spatial3DView(
+        origin="world", name="World, route (blue) and path (red)",
+        overrides={"world/path": so_far},
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=[middle[0] - 0.75 * reach, middle[1] - 0.55 * reach, 0.85 * reach],
+            look_target=[*middle, 0.0], eye_up=[0.0, 0.0, 1.0],
+        ),
+    )  # fmt: skip
+    panels: Sequence[rrb.View] = [
+        rrb.Spatial2DView(origin="view", name="What the agent sees (ahead is the middle)"),
+        rrb.Spatial2DView(origin="recognised", name="The learned view it recognises"),
+        rrb.BarChartView(origin="familiarity", name="Familiarity by degrees to the right"),
+        rrb.TimeSeriesView(origin="deviation", name="Deviation from the route (m)", axis_y=rrb.ScalarAxis(range=(0.0, lost))),
+        rrb.TimeSeriesView(origin="error", name="Heading error (degrees)", axis_y=rrb.ScalarAxis(range=(-90.0, 90.0))),
+        rrb.TextLogView(origin="events", name="Events"),
+    ]
+    about = rrb.TextDocumentView(origin="about", name="About this walk")
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(world, about, row_shares=[4, 1]),
+            rrb.Vertical(*panels, row_shares=[2, 2, 2, 1.5, 1.5, 0.8]), column_shares=[1, 1],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"), collapse_panels=True,
+    )  # fmt: skip

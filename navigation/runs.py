@@ -1,0 +1,117 @@
+"""A run's folder: the recording of a walk, its trajectory, summary and picture; and playing it back."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from world.errors import InputError
+from world.files import replacing, write_route
+from world.geometry import Pose
+
+from .agent import Agent
+from .plots import overview
+from .recording import Recording, check_viewer
+from .trajectory import Trajectory
+
+RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = "recording.rrd", "trajectory.csv", "summary.json", "overview.png", "route.csv"
+FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE)
+
+
+def claim(out: Path, *, overwrite: bool = False, viewer: str | None = None) -> None:
+    """Make the folder of a run, empty of earlier runs. Raises InputError where it cannot be written or holds one.
+
+    viewer: address of a viewer that must be listening, or None. Nothing is touched when it is not.
+    """
+    if viewer is not None:
+        check_viewer(viewer)
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; give a folder for the run")
+    earlier = [out / name for name in FILES if (out / name).exists()]
+    if earlier and not overwrite:
+        raise InputError(f"{out} already holds a run ({earlier[0].name}); give another --out, or --overwrite to replace it")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / RECORDING).touch()
+    except OSError as error:
+        raise InputError(f"{out} cannot be written ({error.strerror}); give another --out") from error
+    for path in earlier:
+        path.unlink()
+
+
+def record_walk(
+    agent: Agent, start: Pose, out: Path, *, training_poses: Float[np.ndarray, "n 3"] | None = None,
+    settings: dict[str, Any] | None = None, viewer: str | None = None, progress: Callable[[int, int], object] = lambda done, total: None,
+) -> dict[str, Any]:  # fmt: skip
+    """Walk from start and leave the walk in the folder `out`; return its summary.
+
+    training_poses: of the views the model knows, in their order: shows the recognised view in the recording. settings: kept in
+    summary.json. progress(done, total): steps, of the most there can be.
+    """
+    world, route, trajectory = agent.renderer.world, agent.route, Trajectory()
+    began = time.perf_counter()
+    with Recording(
+        out / RECORDING, world, route, renderer=agent.renderer, training_poses=training_poses,
+        lost=agent.lost, live=viewer, title=_about(settings),
+    ) as recording:
+        for step in agent.walk(start):
+            recording.log(step)
+            trajectory.add(step)
+            progress(step.index, agent.step_limit)
+    seconds = time.perf_counter() - began
+    summary = trajectory.summary()
+    summary |= {"seconds": seconds, "steps_per_second": summary["steps"] / seconds, "recording": RECORDING}
+    trajectory.write(out / TRAJECTORY)
+    write_route(route, out / ROUTE)
+    title = f"{summary['reason']} after {summary['steps']} steps, {summary['mean_deviation_m']:.3f} m off the route on average"
+    overview(world, out / PICTURE, route=route, walk=trajectory.xy, title=title)
+    # Last of all: a folder with a summary holds a whole run.
+    with replacing(out / SUMMARY) as partial:
+        partial.write_text(json.dumps(summary | {"settings": settings or {}}, indent=2, default=str) + "\n")
+    return summary | {"recording": str(out / RECORDING)}
+
+
+def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dict[str, Any]:
+    """Open a run's recording in the rerun viewer: a window, a browser page served on this machine only, or a picture.
+
+    Raises InputError where there is no recording, or no display and neither `web` nor `screenshot`.
+    """
+    recording = run / RECORDING if run.is_dir() else run
+    if not recording.is_file():
+        raise InputError(f"there is no recording {recording}; give the folder of a run")
+    if screenshot is not None and screenshot.suffix.lower() != ".png":
+        raise InputError(f"{screenshot}: a picture of the viewer is written as .png")
+    viewer = shutil.which("rerun", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
+    if viewer is None:
+        raise InputError("the rerun viewer is not installed here; install rerun-sdk")
+    environment = os.environ | {"RERUN_ANALYTICS": "false"}
+    command = [viewer, "--bind", "127.0.0.1", str(recording)]
+    if screenshot is not None:
+        with replacing(screenshot) as partial:
+            options = ["--headless", "--port", "auto", "--window-size", "1600x1000", "--screenshot-to", str(partial)]
+            done = subprocess.run([*command, *options], env=environment, capture_output=True, text=True)
+            if not partial.exists():
+                lines = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
+                raise InputError(f"the viewer drew no picture ({lines}); it needs Vulkan (Debian: mesa-vulkan-drivers libvulkan1)")
+        return {"recording": str(recording), "screenshot": str(screenshot)}
+    if web:
+        command.append("--web-viewer")
+    elif sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError("there is no display here; add --web to watch in a browser, or --screenshot FILE.png")
+    done = subprocess.run(command, env=environment)
+    if done.returncode:
+        raise InputError(f"the rerun viewer ended with code {done.returncode}; try --web, or --screenshot FILE.png")
+    return {"recording": str(recording)}
+
+
+def _about(settings: dict[str, Any] | None) -> str:
+    """Settings as a markdown list."""
+    return "\n".join(f"- **{key.replace('_', ' ')}**: {value}" for key, value in (settings or {}).items() if value is not None)

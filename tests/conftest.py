@@ -1,0 +1,20 @@
+"""What all tests share. Shapes and types in signatures are checked while the tests run."""
+
+from pathlib import Path
+
+import pytest
+from jaxtyping import install_import_hook
+
+# All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
+CHECKED = ["world", "render.eye", "render.renderer", "render.cubemap", "render.raster", "navigation"]
+install_import_hook(CHECKED, "beartype.beartype")
+
+SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
+
+
+@pytest.fixture(scope="session")
+def sussex() -> Path:
+    """The folder of the original world and routes."""
+    if not SUSSEX.is_dir():
+        pytest.skip("the Sussex world is not on this machine (a folder shared/sussex beside the project)")
+    return SUSSEX

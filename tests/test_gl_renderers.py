@@ -1,0 +1,273 @@
+"""The OpenGL renderers against the exact CPU renderer.
+
+PyOpenGL binds a process to EGL or to OSMesa, so one of the two runs here and the other in a process of its own
+(`test_backend_in_its_own_process`). Without the GL library a test skips; with TUSSOCK_REQUIRE_GL=1 it fails.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from render import Eye, Renderer, gl, open_renderer
+from render.cubemap import Cubemap, face_size_for
+from render.raster import RasterRenderer
+from world.errors import InputError
+from world.files import read_world
+from world.geometry import Bounds, Pose, turn_of_columns
+from world.scene import Ground, World
+
+SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
+BACKENDS = ("egl", "osmesa")
+SKY, SAND = (191, 191, 191), (229, 183, 90)
+HERE = Pose(0.0, 0.0, 0.3)
+
+
+@pytest.fixture(params=BACKENDS)
+def backend(request):
+    """A backend that this process can have."""
+    name = request.param
+    if gl.bound_backend() not in (None, name):
+        pytest.skip(f"this process is bound to {gl.bound_backend()}; {name} runs in a process of its own")
+    try:
+        gl.open_context(name)
+    except InputError as error:
+        if os.environ.get("TUSSOCK_REQUIRE_GL") == "1":
+            pytest.fail(f"TUSSOCK_REQUIRE_GL=1, but {error}")
+        pytest.skip(str(error))
+    return name
+
+
+@pytest.fixture(scope="module")
+def sussex():
+    if not SUSSEX.is_dir():
+        pytest.skip(f"the Sussex world is not in {SUSSEX}")
+    return read_world(SUSSEX / "world5000_gray.bin")
+
+
+def make_world(triangles=(), rgb=(), **kwargs) -> World:
+    settings = {
+        "ground": Ground(SAND, Bounds(-30, -30, 30, 30)),
+        "sky_rgb": SKY,
+        "field": Bounds(-5, -5, 5, 5),
+    } | kwargs
+    triangles = np.array(triangles, dtype=np.float32).reshape(-1, 3, 3)
+    return World(triangles=triangles, rgb=np.array(rgb, dtype=np.uint8).reshape(-1, 3), **settings)
+
+
+@pytest.fixture(scope="module")
+def garden() -> World:
+    """Blades from 2 mm to 25 m away, some behind others by little, and leaves that lie 1 to 5 mm above the ground."""
+    rng = np.random.default_rng(7)
+    distance = np.r_[0.002, 0.004, 0.01, np.geomspace(0.05, 25, 250)]
+    angle = rng.uniform(-np.pi, np.pi, len(distance))
+    foot = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), 0 * angle])
+    blade = (
+        np.stack([0 * foot, rng.normal(0, 0.1, foot.shape), rng.normal(0, 0.1, foot.shape)], axis=1)
+        * distance[:, None, None]
+    )
+    blade[:, 2, 2] = rng.uniform(0.02, 0.3, len(distance)) * np.maximum(distance, 0.2)
+    leaf = rng.uniform(-1, 1, (100, 3, 3)) * 0.3 * [1, 1, 0]
+    leaf += np.column_stack([rng.uniform(-6, 6, (100, 2)), rng.uniform(0.001, 0.005, 100)])[:, None]
+    triangles = np.concatenate([foot[:, None] + blade, leaf])
+    return make_world(triangles, rng.integers(0, 256, (len(triangles), 3)))
+
+
+def difference(a, b) -> np.ndarray:
+    """Largest difference of each pixel's channels (grey levels)."""
+    return np.abs(a.astype(int) - b).max(axis=-1)
+
+
+def assert_agree(views, exact):
+    """Under 1 % of the pixels (the promise is 2) differ visibly, and nothing does on the whole."""
+    assert views.shape == exact.shape
+    assert (difference(views, exact) > 8).mean() < 0.01
+    assert np.abs(views.mean(axis=(0, 1, 2)) - exact.mean(axis=(0, 1, 2))).max() < 0.5
+
+
+def test_agrees_with_the_exact_renderer(backend, garden):
+    poses = [HERE, Pose(1.0, 2.0, -2.0), Pose(-3.0, 0.5, 1.5)]
+    with open_renderer(garden, backend=backend) as ours, open_renderer(garden, backend="cpu") as cpu:
+        assert isinstance(ours, Renderer)
+        assert (ours.world, ours.eye, ours.backend) == (garden, Eye(), backend)
+        views, exact = ours.render(poses), cpu.render(poses)
+    assert_agree(views, exact)
+    palette = {(*rgb, 255) for rgb in garden.rgb.tolist()} | {(*SAND, 255), (*SKY, 0)}
+    assert {tuple(pixel) for pixel in views.reshape(-1, 4).tolist()} <= palette  # no light, gamma or mixture
+
+
+def test_agrees_in_the_sussex_world(backend, sussex):
+    poses = np.array([(5, 5, 0.0), (6.3, 8.45, 2.0), (2.5, 7.5, -1.0)])
+    with open_renderer(sussex, backend=backend) as ours, open_renderer(sussex, backend="cpu") as cpu:
+        assert_agree(ours.render(poses), cpu.render(poses))
+
+
+def test_culled_sussex_frames(backend, sussex):
+    """The frames were drawn by an independent renderer, itself 0.35 to 1.4 grey levels from exact."""
+    world = replace(sussex, double_sided=False)
+    for entry in json.loads((SUSSEX / "frames" / "poses.json").read_text())["views"]:
+        frame = cv2.imread(str(SUSSEX / "frames" / entry["file"]))[..., ::-1]
+        with open_renderer(world, Eye(z=entry["z_m"]), backend) as ours:
+            view = ours.render([Pose(entry["x_m"], entry["y_m"], np.radians(entry["heading_deg"]))])[0]
+        assert np.abs(view[..., :3].astype(int) - frame).mean() < 1.4
+
+
+def test_low_resolution_is_averaged(backend, sussex):
+    eye, poses = Eye(width=120, height=25), np.array([(5, 5, 0.0), (2.5, 7.5, -1.0)])
+    with open_renderer(sussex, eye, backend) as ours, open_renderer(sussex, eye, "cpu") as cpu:
+        views, exact = ours.render(poses), cpu.render(poses)
+    assert difference(views, exact).mean() < 2.5
+    assert np.abs(views.mean(axis=(0, 1, 2)) - exact.mean(axis=(0, 1, 2))).max() < 0.5
+
+
+@pytest.mark.parametrize("eye", [Eye(top=np.pi / 2, bottom=-np.pi / 2), Eye(width=64, height=9, top=0.2, bottom=0.1)])
+def test_any_span_of_elevations(backend, garden, eye):
+    with open_renderer(garden, eye, backend) as ours, open_renderer(garden, eye, "cpu") as cpu:
+        views, exact = ours.render([HERE]), cpu.render([HERE])
+    assert np.abs(views.astype(int) - exact).mean() < 1.5
+
+
+@pytest.mark.parametrize("columns", [180, -360, 37])
+def test_turning_left_rolls_right(backend, garden, columns):
+    with open_renderer(garden, backend=backend) as ours:
+        view, turned = ours.render([HERE, HERE.turned(float(turn_of_columns(columns, 720)))])
+    limit = 0.02 if columns % 180 else 0.0005  # by a quarter turn the cube comes to lie on itself
+    assert (difference(turned, np.roll(view, columns, axis=1)) > 8).mean() < limit
+
+
+def test_a_batch_is_its_poses(backend, garden):
+    poses = [HERE, Pose(1.0, 2.0, -2.0)]
+    with open_renderer(garden, backend=backend) as ours:
+        both = ours.render(poses)
+        np.testing.assert_array_equal(both, np.concatenate([ours.render([pose]) for pose in poses]))
+        assert ours.render([]).shape == (0, 150, 720, 4)
+
+
+def test_back_faces(backend):
+    towards = [(1, 0.2, 0), (1, -0.2, 0), (1, 0, 0.5)]  # its normal points to the eye at the origin
+    assert np.cross(np.subtract(towards[1], towards[0]), np.subtract(towards[2], towards[0]))[0] < 0
+    away = [(-1, -0.2, 0), (-1, 0, 0.5), (-1, 0.2, 0)]
+    world = make_world([towards, away], [(255, 0, 0), (0, 0, 255)])
+    seen = {}
+    for double_sided in (True, False):
+        with open_renderer(replace(world, double_sided=double_sided), backend=backend) as ours:
+            view = ours.render([Pose(0, 0, 0)])[0]
+        seen[double_sided] = tuple(
+            bool((view == (*rgb, 255)).all(-1).any()) for rgb in [(255, 0, 0), (0, 0, 255), SAND]
+        )
+    assert seen == {True: (True, True, True), False: (True, False, True)}
+
+
+def test_nothing_but_sky(backend):
+    with open_renderer(make_world(ground=None), backend=backend) as ours:
+        np.testing.assert_array_equal(ours.render([HERE]), np.full((1, 150, 720, 4), (*SKY, 0)))
+
+
+@pytest.mark.parametrize("pbr", [True, False])
+def test_a_textured_quad(backend, pbr):
+    """Three texels wide, which a careless upload would shear; the meshes replace the triangles, the ground stays."""
+    texels = np.array(
+        [[(255, 0, 0), (0, 255, 0), (0, 0, 255)], [(255, 255, 0), (0, 255, 255), (9, 90, 200)]], dtype=np.uint8
+    )
+    image = Image.fromarray(np.kron(texels, np.ones((16, 16, 1), np.uint8)))  # wide enough to be flat in their middles
+    corners = np.array([(1, 0.6, 0), (1, -0.6, 0), (1, -0.6, 0.8), (1, 0.6, 0.8)])
+    uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    kind = trimesh.visual.material.PBRMaterial if pbr else trimesh.visual.material.SimpleMaterial
+    material = kind(**{"baseColorTexture" if pbr else "image": image})
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    quad = trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], visual=visual, process=False)
+    plain = trimesh.Trimesh(
+        corners * [-1, 1, 1], [(0, 1, 2), (0, 2, 3)], face_colors=[(7, 8, 9, 255)] * 2, process=False
+    )
+    world = make_world(np.concatenate([quad.triangles, plain.triangles]), [(1, 2, 3)] * 4, textured=(quad, plain))
+    with open_renderer(world, backend=backend) as ours:
+        view = ours.render([Pose(0, 0, 0)])[0]
+
+    def at(y, z):
+        """What is seen of the quad's place (1, y, z)."""
+        up, side = np.degrees(np.arctan2(z - 0.01, np.hypot(1, y))), np.degrees(np.arctan(y))
+        return view[int((60 - up) * 2), int((180 - side) * 2)]
+
+    for row, z in enumerate((0.6, 0.2)):
+        for column, y in enumerate((0.4, 0.0, -0.4)):
+            assert np.abs(at(y, z).astype(int) - [*texels[row, column], 255]).max() <= 2
+    assert view[100, 0].tolist() == [7, 8, 9, 255]
+    assert view[-1, 360].tolist() == [*SAND, 255]
+    assert not (view == (1, 2, 3, 255)).all(-1).any()
+
+
+def test_several_at_once(backend, garden, sussex):
+    with open_renderer(garden, backend=backend) as first:
+        before = first.render([HERE])
+        with open_renderer(sussex, Eye(width=90, height=20), backend) as second:
+            between = second.render([Pose(5, 5, 0)])
+            np.testing.assert_array_equal(first.render([HERE]), before)
+            np.testing.assert_array_equal(second.render([Pose(5, 5, 0)]), between)
+        np.testing.assert_array_equal(first.render([HERE]), before)
+        with ThreadPoolExecutor(2) as threads:  # they take turns
+            for view in threads.map(lambda _: first.render([HERE]), range(4)):
+                np.testing.assert_array_equal(view, before)
+    with open_renderer(garden, backend=backend) as again:
+        np.testing.assert_array_equal(again.render([HERE]), before)
+
+
+def test_errors(backend, garden):
+    ours = open_renderer(garden, backend=backend)
+    with pytest.raises(InputError, match="pose 0 is"):
+        ours.render([Pose(0, np.nan, 0)])
+    ours.close()
+    ours.close()
+    with pytest.raises(InputError, match="closed"):
+        ours.render([HERE])
+    with pytest.raises(InputError, match="0 pixels"):
+        RasterRenderer(garden, Eye(), backend, face_size=0)
+    with pytest.raises(InputError, match="at most"):
+        RasterRenderer(garden, Eye(width=8, height=2), backend, face_size=10**6)
+    other = next(name for name in BACKENDS if name != backend)
+    with pytest.raises(InputError, match=f"already uses OpenGL through {backend}.* another process"):
+        open_renderer(garden, backend=other)
+
+
+@pytest.mark.parametrize(("name", "package"), [("egl", "libegl1"), ("osmesa", "libosmesa6")])
+def test_a_missing_library_is_named(garden, monkeypatch, name, package):
+    monkeypatch.setattr(gl, "_loads", lambda library: False)
+    monkeypatch.setattr(gl, "_context", None)
+    monkeypatch.setattr(gl, "bound_backend", lambda: None)
+    with pytest.raises(InputError, match=package) as error:
+        open_renderer(garden, backend=name)
+    assert "\n" not in str(error.value)
+
+
+def test_the_environment_is_left_alone(backend, garden):
+    before = dict(os.environ)
+    with open_renderer(garden, backend=backend):
+        assert gl.gl_device_name()
+    assert dict(os.environ) == before
+
+
+def test_cube_faces_follow_the_eye():
+    names = [face.name for face in Cubemap(Eye(), 64).faces]
+    assert names == ["ahead", "left", "behind", "right", "above"]
+    assert [face.name for face in Cubemap(Eye(top=0.1, bottom=-1.5), 64).faces][-1] == "below"
+    assert face_size_for(Eye()) == 512
+
+
+@pytest.mark.parametrize("name", BACKENDS)
+def test_backend_in_its_own_process(name):
+    """What this process cannot have runs in another; what it has, ran here."""
+    if gl.bound_backend() in (None, name):
+        pytest.skip(f"{name} runs in this process")
+    command = [sys.executable, "-m", "pytest", __file__, "-k", f"{name} and not own_process", "-p", "no:cacheprovider"]
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=Path(__file__).parents[1], timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
