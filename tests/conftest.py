@@ -7,7 +7,7 @@ from jaxtyping import install_import_hook
 
 # All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
 CHECKED = ["world", "render.eye", "render.renderer", "render.cubemap", "render.raster", "navigation"]
-install_import_hook(CHECKED, "beartype.beartype")
+install_import_hook(CHECKED, "typecheck.check")
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 

@@ -82,7 +82,7 @@ class Route:
         if not np.isfinite(poses).all():
             row = int(np.flatnonzero(~np.isfinite(poses).all(axis=1))[0])
             raise InputError(f"route point {row + 1} is {poses[row].tolist()}; a route needs finite numbers")
-        keep = np.r_[True, np.hypot(*np.diff(poses[:, :2], axis=0).T) > 0]
+        keep = np.r_[True, np.hypot(*np.diff(poses[:, :2], axis=0).T) > 1e-9]  # m
         poses = poses[keep]
         if len(poses) < 2:
             raise InputError(f"a route needs at least 2 distinct points, got {len(poses)}")

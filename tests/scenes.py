@@ -1,0 +1,34 @@
+"""Tiny worlds for tests."""
+
+import numpy as np
+
+from world.geometry import Bounds
+from world.scene import Ground, World
+
+FIELD = Bounds(-3.0, -3.0, 3.0, 3.0)
+
+
+def random_world(seed: int = 0, n: int = 80, *, ground: bool = True, double_sided: bool = True) -> World:
+    """Coloured triangles standing about at random, some very near the origin, some high above, some below the ground."""
+    rng = np.random.default_rng(seed)
+    foot = rng.uniform(-3, 3, (n, 1, 3)) * [1, 1, 0.2]
+    triangles = (foot + rng.normal(scale=0.25, size=(n, 3, 3))).astype(np.float32)
+    return world_of(triangles, rng.integers(0, 256, (n, 3)).astype(np.uint8), ground=ground, double_sided=double_sided)
+
+
+def world_of(triangles: np.ndarray, rgb: np.ndarray, *, ground: bool = True, double_sided: bool = True) -> World:
+    """A world of the given triangles."""
+    return World(
+        triangles=np.asarray(triangles, dtype=np.float32),
+        rgb=np.asarray(rgb, dtype=np.uint8),
+        ground=Ground((200, 180, 140), FIELD) if ground else None,
+        sky_rgb=(120, 160, 250),
+        field=FIELD,
+        double_sided=double_sided,
+    )
+
+
+def random_poses(n: int, seed: int = 1) -> np.ndarray:
+    """Poses (n, 3) inside FIELD."""
+    rng = np.random.default_rng(seed)
+    return np.column_stack([rng.uniform(-2, 2, (n, 2)), rng.uniform(-np.pi, np.pi, n)])

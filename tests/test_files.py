@@ -1,0 +1,200 @@
+"""Every reader and writer of worlds and routes: what is written comes back, what is damaged is refused in one line."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+from scenes import random_world
+
+from world.errors import InputError
+from world.files import read_route, read_world, replacing, write_route, write_world
+from world.geometry import Route
+from world.scene import World
+
+SUFFIXES = (".glb", ".ply")
+
+
+def same(a: World, b: World) -> bool:
+    arrays = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("triangles", "rgb"))
+    return arrays and all(getattr(a, name) == getattr(b, name) for name in ("ground", "sky_rgb", "field", "double_sided", "origin"))
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("world", [World.generate("tiny", 5), random_world(double_sided=False), random_world(ground=False)])
+def test_a_world_comes_back_whole_and_the_same_bytes_twice(tmp_path, suffix, world):
+    for name in ("a", "b"):
+        write_world(world, tmp_path / (name + suffix))
+    assert (tmp_path / ("a" + suffix)).read_bytes() == (tmp_path / ("b" + suffix)).read_bytes()
+    assert same(read_world(tmp_path / ("a" + suffix)), world)
+
+
+def test_the_sussex_world_survives_both_formats(tmp_path, sussex):
+    world = read_world(sussex / "world5000_gray.bin")
+    assert world.triangles.shape == (5000, 3, 3)
+    assert (world.rgb[:, [0, 2]] == 0).all()
+    for suffix in SUFFIXES:
+        write_world(world, tmp_path / f"w{suffix}")
+        assert same(read_world(tmp_path / f"w{suffix}"), world)
+
+
+def test_an_antworld_file_is_read_as_its_format_says(tmp_path):
+    triangles = np.array([[[0, 1, 2], [3, 4, 5], [6, 7, 8]], [[1, 1, 1], [2, 1, 1], [2, 2, 2]]], dtype=float)
+    planes = [triangles[:, corner, axis] for axis in range(3) for corner in range(3)]  # x0 x1 x2 y0 ..
+    np.concatenate([*planes, *[[0.5, 1.0]] * 3]).astype("<f8").tofile(tmp_path / "w.bin")
+    world = read_world(tmp_path / "w.bin")
+    assert np.array_equal(world.triangles, triangles.astype(np.float32))
+    assert world.rgb.tolist() == [[0, 128, 0], [0, 255, 0]]
+    assert world.ground is not None
+    assert world.ground.bounds == (0, 1, 6, 7)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".ply", ".obj"])
+def test_vertex_colours_of_foreign_meshes_become_triangle_colours(tmp_path, suffix):
+    box = trimesh.creation.box()
+    box.unmerge_vertices()
+    colours = np.random.default_rng(0).integers(0, 256, (len(box.faces), 3)).astype(np.uint8)
+    box.visual.vertex_colors = np.repeat(np.column_stack([colours, np.full(len(colours), 255, np.uint8)]), 3, axis=0)
+    box.export(tmp_path / f"box{suffix}")
+    world = read_world(tmp_path / f"box{suffix}")
+    assert np.allclose(world.triangles, box.triangles, atol=1e-6)
+    assert np.abs(world.rgb.astype(int) - colours).max() <= 1
+    assert world.field == (-0.5, -0.5, 0.5, 0.5)
+
+
+def test_face_colours_of_foreign_meshes_are_kept(tmp_path):
+    box = trimesh.creation.box()
+    box.visual.face_colors = np.column_stack([np.arange(12) * 20, np.arange(12), 255 - np.arange(12), np.full(12, 255)]).astype(np.uint8)
+    box.export(tmp_path / "box.ply")
+    assert np.array_equal(read_world(tmp_path / "box.ply").rgb, box.visual.face_colors[:, :3])
+
+
+def textured_square(image: np.ndarray) -> trimesh.Trimesh:
+    """Two triangles, the square's lower right and upper left half, with an image across the square."""
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(image))
+    visual = trimesh.visual.TextureVisuals(uv=corners, material=material)
+    return trimesh.Trimesh(np.column_stack([corners, np.ones(4)]), [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
+
+
+def test_textures_are_averaged_over_each_triangle_and_kept_for_gl(tmp_path):
+    image = np.zeros((64, 64, 3), dtype=np.uint8)
+    across, down = np.meshgrid(np.arange(64), np.arange(64))
+    image[across + down >= 63] = (200, 100, 50)  # the lower right half of the picture
+    textured_square(image).export(tmp_path / "square.glb")
+    world = read_world(tmp_path / "square.glb")
+    assert np.abs(world.rgb.astype(int) - [[200, 100, 50], [0, 0, 0]]).max() <= 25  # but for the diagonal
+    assert len(world.textured) == 1
+    write_world(world, tmp_path / "again.glb")
+    again = read_world(tmp_path / "again.glb")
+    assert same(again, world)
+    assert len(again.textured) == 1
+    with pytest.raises(InputError, match="textures"):
+        write_world(world, tmp_path / "square.ply")
+
+
+def test_a_route_comes_back_from_csv(tmp_path):
+    route = Route(np.array([[0.1, 1 / 3, 0.5], [1.0, -2.0, -3.0], [4.0, 5.0, 3.0]]))
+    write_route(route, tmp_path / "r.csv")
+    assert (tmp_path / "r.csv").read_text().startswith("x_m,y_m,heading_deg\n0.1,")
+    assert np.allclose(read_route(tmp_path / "r.csv").poses, route.poses, rtol=0, atol=1e-15)
+
+
+def test_a_route_without_headings_faces_along_itself(tmp_path):
+    (tmp_path / "r.csv").write_text("y_m, x_m\n0, 0\n1, 0\n1, 1\n")
+    assert np.allclose(np.degrees(read_route(tmp_path / "r.csv").poses[:, 2]), [90, 0, 0])
+
+
+def test_the_sussex_routes_are_metres_and_radians(sussex):
+    route = read_route(sussex / "ant1_route1.bin")
+    assert np.allclose(route.start, (6.30, 8.45, np.radians(-130.3464364)))
+    assert np.allclose(route.goal[:2], (5.10, 1.00))
+    assert np.isclose(route.length, 8.114, atol=1e-3)
+
+
+BAD_ROUTES = {
+    "x_m,y_m,heading_deg\n0,0,0\nnan,1,2\n": r"r\.csv, line 3: x_m is 'nan'; a route needs finite metres",
+    "x_m,y_m,heading_deg\n0,0,0\n1,1,inf\n": "line 3: heading_deg is 'inf'; a route needs finite degrees",
+    "x_m,y_m,heading_deg\n0,0,0\n1\n": "line 3: y_m is ''",
+    "x_m,y_m,heading_deg\n0,0,0\n1,here,2\n": "line 3: y_m is 'here'",
+    "x_m,y_m,heading_deg\n0,0,0\n": "1 point.* at least 2",
+    "x_m,y_m,heading_deg\n0,0,0\n0,0,9\n": "at least 2 distinct",
+    "a,b,c\n0,0,0\n": "line 1: the columns are 'a,b,c'",
+    "": "line 1",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), BAD_ROUTES.items())
+def test_bad_routes_are_refused_by_line(tmp_path, text, message):
+    (tmp_path / "r.csv").write_text(text)
+    with pytest.raises(InputError, match=message) as refusal:
+        read_route(tmp_path / "r.csv")
+    assert str(tmp_path / "r.csv") in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "message"),
+    [
+        ("w.bin", b"\0" * 95, "95 bytes.* multiple of 96"),
+        ("w.bin", b"", "0 bytes"),
+        ("w.bin", np.full(12, np.nan).tobytes(), "triangle 0 .* not finite"),
+        ("w.bin", np.full(12, 7.0).tobytes(), "colours run from 7 to 7"),
+        ("w.glb", b"glTF", "cannot be read"),
+        ("w.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "cannot be read"),
+        ("w.obj", b"v 0 0 0\n", "no triangles|cannot be read"),
+        ("w.xyzzy", b"", "unknown kind"),
+    ],
+)
+def test_damaged_worlds_are_refused(tmp_path, name, data, message):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=message):
+        read_world(tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@given(share=st.floats(0.01, 0.99))
+def test_a_truncated_world_is_refused(tmp_path_factory, suffix, share):
+    folder = tmp_path_factory.mktemp("w")
+    write_world(World.generate("tiny", 1), folder / f"w{suffix}")
+    data = (folder / f"w{suffix}").read_bytes()
+    (folder / f"cut{suffix}").write_bytes(data[: int(share * len(data))])
+    with pytest.raises(InputError, match="cut"):
+        read_world(folder / f"cut{suffix}")
+
+
+def test_missing_files_are_named(tmp_path):
+    with pytest.raises(InputError, match=r"no world file .*nowhere\.glb"):
+        read_world(tmp_path / "nowhere.glb")
+    with pytest.raises(InputError, match=r"no route file .*nowhere\.csv"):
+        read_route(tmp_path / "nowhere.csv")
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
+    path = tmp_path / "w.glb"
+    path.write_text("old")
+
+    def fail():
+        with replacing(path) as partial:
+            partial.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["w.glb"]
+
+
+def test_what_cannot_be_written_is_refused(tmp_path):
+    world = random_world()
+    with pytest.raises(InputError, match="is a folder"):
+        write_world(world, make(tmp_path / "folder.glb"))
+    with pytest.raises(InputError, match="no folder"):
+        write_world(world, tmp_path / "nowhere" / "w.glb")
+    with pytest.raises(InputError, match=r"\.glb or \.ply"):
+        write_world(world, tmp_path / "w.obj")
+
+
+def make(folder):
+    folder.mkdir()
+    return folder

@@ -1,0 +1,177 @@
+"""The CPU renderer against Embree (an independent ray caster), against another program's pictures, and against its own laws."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from scenes import random_poses, random_world, world_of
+
+from render.eye import Eye
+from render.renderer import open_renderer
+from render.scanline import ScanlineRenderer
+from world.errors import InputError
+from world.files import read_world
+from world.geometry import column_azimuths
+from world.scene import World
+
+
+def embree(world: World, eye: Eye, pose) -> np.ndarray:
+    """A view (height, width, 4) by casting the eye's rays with Embree; one ray a pixel."""
+    triangles, rgb = world.surfaces()
+    mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
+    azimuth, elevation = pose[2] + column_azimuths(eye.width), eye.elevations()[:, None]
+    towards = np.broadcast_arrays(np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+    towards = np.stack(towards, axis=-1).reshape(-1, 3)
+    hit = mesh.ray.intersects_first(np.broadcast_to([pose[0], pose[1], eye.z], towards.shape), towards)
+    hit = hit.reshape(eye.height, eye.width)
+    view = np.concatenate([rgb, np.full((len(rgb), 1), 255, np.uint8)], axis=1)[hit]
+    view[hit < 0] = [*world.sky_rgb, 0]
+    return view
+
+
+def share_different(a: np.ndarray, b: np.ndarray) -> float:
+    return float((a != b).any(axis=-1).mean())
+
+
+@pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub", "tiny"])
+def test_equals_embree_in_generated_worlds(preset):
+    world = World.generate(preset, seed=3)
+    rng = np.random.default_rng(0)
+    x0, y0, x1, y1 = world.field
+    poses = np.column_stack([rng.uniform(x0, x1, 3), rng.uniform(y0, y1, 3), rng.uniform(-3, 3, 3)])
+    with open_renderer(world, backend="cpu") as renderer:
+        for pose, view in zip(poses, renderer.render(poses), strict=True):
+            assert share_different(view, embree(world, renderer.eye, pose)) < 0.001
+
+
+def test_equals_embree_in_the_sussex_world(sussex):
+    world = read_world(sussex / "world5000_gray.bin")
+    poses = random_poses(4) + [5, 5, 0]
+    with open_renderer(world, backend="cpu") as renderer:
+        for pose, view in zip(poses, renderer.render(poses), strict=True):
+            assert share_different(view, embree(world, renderer.eye, pose)) < 0.001
+
+
+@pytest.mark.parametrize("span", [(90, -90), (60, -15), (5, -80)])
+def test_equals_embree_among_triangles_above_below_and_around_the_eye(span):
+    world = random_world(seed=5, n=400)
+    top, bottom = np.radians(span)
+    eye = Eye(width=360, height=120, top=top, bottom=bottom, z=0.1)
+    with open_renderer(world, eye, "cpu") as renderer:
+        for pose in random_poses(5):
+            assert share_different(renderer.render([pose])[0], embree(world, eye, pose)) < 0.001
+
+
+def test_agrees_with_another_programs_pictures(sussex):
+    world = read_world(sussex / "world5000_gray.bin")
+    world = World(**{**vars(world), "double_sided": False})
+    for known in json.loads((sussex / "frames" / "poses.json").read_text())["views"]:
+        theirs = cv2.imread(str(sussex / "frames" / known["file"]))[..., ::-1].astype(int)
+        with open_renderer(world, Eye(z=known["z_m"]), "cpu") as renderer:
+            ours = renderer.render([(known["x_m"], known["y_m"], np.radians(known["heading_deg"]))])[0, ..., :3]
+        assert np.abs(ours - theirs).mean() < 2.6
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    with open_renderer(random_world(), Eye(width=120, height=40, samples=1, z=0.05), "cpu") as opened:
+        yield opened
+
+
+def test_turning_left_rolls_the_view_right(renderer):
+    for pose in random_poses(5):
+        view = renderer.render([pose])[0]
+        for columns in (1, 17, 60, 119):
+            turned = renderer.render([pose + [0, 0, columns * 2 * np.pi / 120]])[0]
+            assert share_different(turned, np.roll(view, columns, axis=1)) < 0.002
+
+
+def test_a_view_does_not_change_when_world_and_pose_move_together(renderer):
+    world, angle, shift = renderer.world, 0.7, np.array([0.5, -0.25, 0])
+    c, s = np.cos(angle), np.sin(angle)
+    rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    moved = World(**{**vars(world), "triangles": (world.triangles @ rotation.T + shift).astype(np.float32), "ground": None})
+    still = World(**{**vars(world), "ground": None})
+    with open_renderer(moved, renderer.eye, "cpu") as of_moved, open_renderer(still, renderer.eye, "cpu") as of_still:
+        for x, y, heading in random_poses(5):
+            there = (*(rotation @ [x, y, 0] + shift)[:2], heading + angle)
+            assert share_different(of_moved.render([there])[0], of_still.render([(x, y, heading)])[0]) < 0.002
+
+
+def test_a_mirrored_world_mirrors_the_view(renderer):
+    mirrored = World(**{**vars(renderer.world), "triangles": renderer.world.triangles * np.float32([1, -1, 1])})
+    with open_renderer(mirrored, renderer.eye, "cpu") as other:
+        for x, y, heading in random_poses(5):
+            view, mirror = renderer.render([(x, y, heading)])[0], other.render([(x, -y, -heading)])[0]
+            assert share_different(view, mirror[:, ::-1]) < 0.002
+
+
+def test_a_batch_equals_its_views_one_by_one_and_threads_do_not_matter(renderer):
+    poses = random_poses(7)
+    batch = renderer.render(poses)
+    assert all(np.array_equal(view, renderer.render([pose])[0]) for view, pose in zip(batch, poses, strict=True))
+    for threads in (1, 3, 5):
+        with ScanlineRenderer(renderer.world, renderer.eye, threads=threads) as other:
+            assert np.array_equal(other.render(poses), batch)
+            assert np.array_equal(other.render(poses[:1]), batch[:1])
+
+
+def test_low_resolution_is_the_mean_over_each_pixels_solid_angle():
+    world = random_world()
+    coarse, fine = Eye(width=60, height=20, samples=4, z=0.05), Eye(width=240, height=80, samples=1, z=0.05)
+    with open_renderer(world, coarse, "cpu") as low, open_renderer(world, fine, "cpu") as high:
+        for pose in random_poses(4):
+            weight = np.cos(fine.elevations()).reshape(20, 4, 1, 1, 1)
+            pixels = high.render([pose])[0].reshape(20, 4, 60, 4, 4) * weight
+            mean = pixels.sum(axis=(1, 3)) / (4 * weight.sum(axis=1))[:, 0]
+            assert np.abs(low.render([pose])[0] - mean).max() <= 0.5 + 1e-6
+
+
+def test_culling_shows_a_triangle_only_from_its_front():
+    # Seen from the origin, the first faces the eye (its normal points west, to the eye), the second is its reverse.
+    front = np.array([[1, -1, -1], [1, 0, 1], [1, 1, -1]])
+    eye = Eye(width=16, height=9, top=0.5, bottom=-0.5, z=0.0)
+    ahead = (4, 8)
+    for corners, seen in ((front, True), (front[::-1], False)):
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        assert (normal @ -corners[0] > 0) == seen
+        for double_sided in (False, True):
+            world = world_of(corners[None], [[10, 20, 30]], ground=False, double_sided=double_sided)
+            with open_renderer(world, eye, "cpu") as opened:
+                assert (opened.render([(0.0, 0.0, 0.0)])[0][ahead][3] == 255) == (seen or double_sided)
+
+
+def test_alpha_is_the_share_that_is_not_sky(renderer):
+    view = renderer.render(random_poses(3))
+    sky = (view[..., :3] == renderer.world.sky_rgb).all(axis=-1)
+    assert np.array_equal(sky, view[..., 3] == 0)
+    assert (view[:, -1, :, 3] == 255).all()  # ground
+
+
+def test_an_empty_batch_is_empty_and_a_closed_renderer_says_so():
+    opened = open_renderer(random_world(), Eye(width=8, height=2), "cpu")
+    assert opened.render(np.empty((0, 3))).shape == (0, 2, 8, 4)
+    opened.close()
+    with pytest.raises(InputError, match="closed"):
+        opened.render([(0.0, 0.0, 0.0)])
+
+
+@pytest.mark.parametrize("pose", [(np.nan, 0.0, 0.0), (0.0, np.inf, 0.0)])
+def test_poses_that_are_not_finite_are_refused(renderer, pose):
+    with pytest.raises(InputError, match="finite"):
+        renderer.render([pose])
+
+
+@pytest.mark.parametrize(
+    ("eye", "message"), [({"width": 0}, "0 x 150"), ({"height": 0}, "720 x 0"), ({"top": -1.0}, "bottom < top"), ({"samples": 0}, "samples")]
+)
+def test_eyes_that_see_nothing_are_refused(eye, message):
+    with pytest.raises(InputError, match=message):
+        Eye(**eye)
+
+
+def test_an_unknown_renderer_is_refused_with_the_known_ones():
+    with pytest.raises(InputError, match="cpu, egl, osmesa"):
+        open_renderer(random_world(), Eye(), "vulkan")
