@@ -133,10 +133,15 @@ class Encoding:
         """Feature images of views (n, height, width, 3 or 4) uint8."""
         if views.ndim != 4 or views.shape[-1] not in (3, 4) or views.dtype != np.uint8:
             raise InputError(f"views are (n, height, width, 3 or 4) uint8, got {views.shape} {views.dtype}")
+        # A few views at a time stay in the processor's cache through all the steps.
+        parts = [self._encode(views[start : start + 4]) for start in range(0, max(1, len(views)), 4)]
+        return torch.from_numpy(np.concatenate(parts))
+
+    def _encode(self, views: Views) -> Images:
         images = views
         for step in self.steps:
             images = step(images)
-        return torch.from_numpy(np.ascontiguousarray(images, dtype=np.float32))
+        return images.astype(np.float32, copy=False)
 
     def __str__(self) -> str:
         return " | ".join(" ".join([step.word, *(f"{getattr(step, f.name):g}" for f in fields(step))]) for step in self.steps)

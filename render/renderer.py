@@ -13,7 +13,7 @@ from world.scene import World
 
 from .eye import Eye
 
-Poses = Float[np.ndarray, "n 3"] | Sequence[Pose]
+Poses = Float[np.ndarray, "n 3"] | Sequence[Pose | Sequence[float] | Float[np.ndarray, "3"]]
 Views = UInt8[np.ndarray, "n height width 4"]
 
 BACKENDS = ("auto", "cpu", "egl", "osmesa")

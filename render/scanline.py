@@ -28,40 +28,32 @@ from world.scene import World
 from .eye import Eye
 from .renderer import Poses, as_poses
 
-# atan(x) / x as a polynomial in x^2 on [0, 1], within 2e-7: enough to find candidate columns and rows, which exact tests follow.
+# atan(x) / x as a polynomial in x^2 on [0, 1], within 2e-7: enough to find candidate columns, which exact tests follow.
 _x = np.cos(np.pi * (np.arange(200) + 0.5) / 400)
-_ATAN = tuple(float(c) for c in np.polynomial.polynomial.polyfit(_x**2, np.arctan(_x) / _x, 7))
+_A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7 = (float(c) for c in np.polynomial.polynomial.polyfit(_x**2, np.arctan(_x) / _x, 7))
 _ATAN_ERROR = 1e-6
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _arctan2(y: float, x: float) -> float:
-    """atan2 within _ATAN_ERROR."""
-    ax, ay = abs(x), abs(y)
-    high, low = max(ax, ay), min(ax, ay)
-    if high == 0.0:
-        return 0.0
-    q = low / high
-    s = q * q
-    angle = 0.0
-    for k in range(len(_ATAN) - 1, -1, -1):
-        angle = angle * s + _ATAN[k]
-    angle *= q
-    if ay > ax:
-        angle = 0.5 * np.pi - angle
-    if x < 0.0:
-        angle = np.pi - angle
-    return -angle if y < 0.0 else angle
-
-
-@numba.njit(cache=True, nogil=True)
-def _columns_of(a, b, c, heading, width):
-    """First and last column (unwrapped, may leave 0..width-1) whose centre may look at a triangle with corners a, b, c."""
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _columns_of(x, y, eye_x, eye_y, heading, width, columns):
+    """Column (unwrapped, fractional, within 2 _ATAN_ERROR width / 2 pi) in which the eye sees each place (x, y), into `columns`."""
     scale = width / (2 * np.pi)
-    pad = 1e-6 + 2 * _ATAN_ERROR * scale
-    ca = (np.pi - (_arctan2(a[1], a[0]) - heading)) * scale - 0.5
-    cb = (np.pi - (_arctan2(b[1], b[0]) - heading)) * scale - 0.5
-    cc = (np.pi - (_arctan2(c[1], c[0]) - heading)) * scale - 0.5
+    for k in range(x.size):  # no branches, so that it is vectorised
+        dx, dy = x[k] - eye_x, y[k] - eye_y
+        ax, ay = abs(dx), abs(dy)
+        q = min(ax, ay) / (max(ax, ay) + 1e-300)
+        s = q * q
+        angle = q * (_A0 + s * (_A1 + s * (_A2 + s * (_A3 + s * (_A4 + s * (_A5 + s * (_A6 + s * _A7)))))))
+        angle = 0.5 * np.pi - angle if ay > ax else angle
+        angle = np.pi - angle if dx < 0.0 else angle
+        angle = -angle if dy < 0.0 else angle
+        columns[k] = (np.pi - (angle - heading)) * scale - 0.5
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _column_range(ca, cb, cc, width):
+    """First (0..width-1) and last (may exceed width - 1) column whose centre may look at a triangle with corners in three columns."""
+    pad = 1e-6 + 2 * _ATAN_ERROR * width / (2 * np.pi)
     ab, bc, ac = cb - ca, cc - cb, cc - ca
     ab -= width * np.rint(ab / width)
     bc -= width * np.rint(bc / width)
@@ -76,36 +68,45 @@ def _columns_of(a, b, c, heading, width):
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def _rows_between(low, high, tangents, top, rows_per_radian):
+def _bin(t, bins):
+    """Place of a tangent among `bins` bins that are nearly even in elevation."""
+    return int((1.0 + t / (1.0 + abs(t))) * (0.5 * bins))
+
+
+def _row_table(tangents: Float[np.ndarray, " height"]) -> np.ndarray:
+    """For each `_bin`: how many rows lie above it for certain. A search for a tangent's row starts there."""
+    bins = 8 * len(tangents)
+    u = (np.arange(1, bins + 1) + 1e-9) / bins * 2 - 1  # upper border of the bin, rounding included
+    borders = np.append(u[:-1] / (1 - np.abs(u[:-1])), np.inf)
+    return np.searchsorted(-tangents, -borders, side="left").astype(np.int32)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _rows_between(low, high, tangents, table):
     """First and last row whose tan(elevation) lies in [low, high]; first > last where there is none."""
-    last_row = tangents.size - 1
-    if low > tangents[0] or high < tangents[last_row]:
+    count = tangents.size
+    if low > tangents[0] or high < tangents[count - 1]:
         return 1, 0
     first = 0
     if high < tangents[0]:
-        first = int((top - _arctan2(high, 1.0)) * rows_per_radian)
-        first = min(max(first, 0), last_row)
-        while first > 0 and tangents[first - 1] <= high:
-            first -= 1
+        first = table[_bin(high, table.size)]
         while tangents[first] > high:
             first += 1
-    last = last_row
-    if low > tangents[last_row]:
-        last = int((top - _arctan2(low, 1.0)) * rows_per_radian)
-        last = min(max(last, 0), last_row)
-        while last < last_row and tangents[last + 1] >= low:
+    last = count - 1
+    if low > tangents[last]:
+        last = table[_bin(low, table.size)]
+        while tangents[last] >= low:
             last += 1
-        while tangents[last] < low:
-            last -= 1
+        last -= 1
     return first, last
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _draw(triangles, cull, eye, heading, cosines, sines, tangents, top, rows_per_radian, start, stop, nearness, seen):
+def _draw(triangles, columns, cull, eye, cosines, sines, tangents, table, start, stop, nearness, seen):
     """Draw all triangles into columns start..stop-1: the nearest triangle of each pixel into `seen` (-1: none).
 
-    triangles (n, 3, 3); eye (3,); cosines, sines (width,) of the columns' azimuths in the world; tangents (height,) of the rows'
-    elevations; nearness, seen (width, height): inverse distance and triangle, columns contiguous.
+    triangles (n, 3, 3), their corners' columns (3, n); eye (3,); cosines, sines (width,) of the columns' azimuths in the world;
+    tangents (height,) of the rows' elevations and their `_row_table`; nearness, seen (width, height): inverse distance and triangle.
     """
     width = cosines.size
     nearness[start:stop] = 0.0
@@ -114,13 +115,13 @@ def _draw(triangles, cull, eye, heading, cosines, sines, tangents, top, rows_per
     p, q = np.empty(3), np.empty(3)  # an edge's bound on t is p cos + q sin
     side = np.empty(3, np.int64)  # +1: a lower bound, -1: an upper, 0: the edge's plane is vertical, p cos + q sin >= 0 is the test
     for i in range(triangles.shape[0]):
+        first, last = _column_range(columns[0, i], columns[1, i], columns[2, i], width)
+        if first > last or (first >= stop and last < start + width) or (last < start):
+            continue
         for k in range(3):
             a[k] = triangles[i, 0, k] - eye[k]
             b[k] = triangles[i, 1, k] - eye[k]
             c[k] = triangles[i, 2, k] - eye[k]
-        first, last = _columns_of(a, b, c, heading, width)
-        if first > last or (first >= stop and last < start + width) or (last < start):
-            continue
         bx, by, bz = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
         volume = a[0] * bx + a[1] * by + a[2] * bz
         if volume == 0.0 or (cull and volume > 0.0):
@@ -154,7 +155,7 @@ def _draw(triangles, cull, eye, heading, cosines, sines, tangents, top, rows_per
                     low = np.inf
             if low > high:
                 continue
-            r0, r1 = _rows_between(low, high, tangents, top, rows_per_radian)
+            r0, r1 = _rows_between(low, high, tangents, table)
             base = gx * cos + gy * sin
             depth, index = nearness[j], seen[j]
             for r in range(r0, r1 + 1):
@@ -165,33 +166,37 @@ def _draw(triangles, cull, eye, heading, cosines, sines, tangents, top, rows_per
 
 
 @numba.njit(cache=True, nogil=True)
-def _average(seen, rgb, sky, rays, weights, start, stop, view):
+def _average(seen, rgba, rays, weights, start, stop, view):
     """Average the rays of each pixel of columns start..stop-1 into view (height, width, 4), by solid angle.
 
-    seen (width * rays, height * rays); weights (height, rays) sum to 1 / rays over a pixel's sub-rows.
+    seen (width * rays, height * rays); rgba (n + 1, 4) of the triangles, the sky's last; weights (height, rays) sum to 1 / rays
+    over a pixel's sub-rows.
     """
-    for row in range(view.shape[0]):
-        for column in range(start, stop):
+    height = view.shape[0]
+    for column in range(start, stop):
+        for row in range(height):
+            if rays == 1:
+                for k in range(4):
+                    view[row, column, k] = rgba[seen[column, row], k]
+                continue
             red = green = blue = cover = 0.0
             for y in range(rays):
-                r = g = b = 0
-                hits = 0
+                r = g = b = a = 0
                 for x in range(rays):
-                    i = seen[column * rays + x, row * rays + y]
-                    if i >= 0:
-                        r += rgb[i, 0]
-                        g += rgb[i, 1]
-                        b += rgb[i, 2]
-                        hits += 1
-                miss = rays - hits
-                red += weights[row, y] * (r + miss * sky[0])
-                green += weights[row, y] * (g + miss * sky[1])
-                blue += weights[row, y] * (b + miss * sky[2])
-                cover += weights[row, y] * hits
+                    colour = rgba[seen[column * rays + x, row * rays + y]]
+                    r += colour[0]
+                    g += colour[1]
+                    b += colour[2]
+                    a += colour[3]
+                weight = weights[row, y]
+                red += weight * r
+                green += weight * g
+                blue += weight * b
+                cover += weight * a
             view[row, column, 0] = np.uint8(red + 0.5)
             view[row, column, 1] = np.uint8(green + 0.5)
             view[row, column, 2] = np.uint8(blue + 0.5)
-            view[row, column, 3] = np.uint8(255.0 * cover + 0.5)
+            view[row, column, 3] = np.uint8(cover + 0.5)
 
 
 class ScanlineRenderer:
@@ -207,12 +212,14 @@ class ScanlineRenderer:
         self.eye = eye
         triangles, rgb = world.surfaces()
         self._triangles = np.ascontiguousarray(triangles, dtype=np.float64)
-        self._rgb = rgb
-        self._sky = np.array(world.sky_rgb, dtype=np.float64)
+        self._x, self._y = (np.ascontiguousarray(self._triangles[:, :, axis].T) for axis in (0, 1))  # (3, n)
+        covered = np.column_stack([rgb, np.full(len(rgb), 255)])
+        self._rgba = np.vstack([covered, [*world.sky_rgb, 0]]).astype(np.uint8)  # what nothing covers is seen as index -1
         rays = eye.rays
         self._azimuths = column_azimuths(eye.width * rays)
         elevations = eye.elevations(rays)
         self._tangents = np.tan(elevations)
+        self._row_table = _row_table(self._tangents)
         weights = np.cos(elevations).reshape(eye.height, rays)
         self._weights = weights / weights.sum(axis=1, keepdims=True) / rays
         self._threads = threads or len(os.sched_getaffinity(0))
@@ -243,14 +250,15 @@ class ScanlineRenderer:
         eye, rays = self.eye, self.eye.rays
         shape = (eye.width * rays, eye.height * rays)
         nearness, seen = np.empty(shape), np.empty(shape, dtype=np.int32)
-        rows_per_radian = shape[1] / (eye.top - eye.bottom)
+        columns = np.empty(self._x.shape)
         for (x, y, heading), view in zip(poses, views, strict=True):
             azimuths = heading + self._azimuths
+            _columns_of(self._x.ravel(), self._y.ravel(), x, y, heading, shape[0], columns.ravel())
             _draw(
-                self._triangles, not self.world.double_sided, np.array([x, y, eye.z]), heading, np.cos(azimuths), np.sin(azimuths),
-                self._tangents, eye.top, rows_per_radian, start * rays, stop * rays, nearness, seen,
+                self._triangles, columns, not self.world.double_sided, np.array([x, y, eye.z]), np.cos(azimuths), np.sin(azimuths),
+                self._tangents, self._row_table, start * rays, stop * rays, nearness, seen,
             )  # fmt: skip
-            _average(seen, self._rgb, self._sky, rays, self._weights, start, stop, view)
+            _average(seen, self._rgba, rays, self._weights, start, stop, view)
 
     def close(self) -> None:
         """Stop the threads."""
