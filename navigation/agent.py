@@ -15,7 +15,13 @@ from .familiarity import FamiliarityModel, SnapshotModel
 from .rotation import best_turn, scan_window
 
 # Why a walk ends. The first is success.
-ARRIVED, LOST, STUCK, OUT_OF_WORLD, OUT_OF_STEPS = "arrived", "lost", "stuck in a loop", "out of the world", "out of steps"
+ARRIVED, LOST, STUCK, OUT_OF_WORLD, OUT_OF_STEPS = (
+    "arrived",
+    "lost",
+    "stuck in a loop",
+    "out of the world",
+    "out of steps",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +109,7 @@ class Agent:
             familiarity, match = self._scan(view, pose)
             turn = match_turn = float(best_turn(familiarity[None], self._window(len(familiarity), pose))[0])
             turn = float(wrap_angle(turn + self.heading_noise * random.standard_normal()))
-            (deviation,), (along,) = self.route.nearest([pose[:2]])
+            (deviation,), (along,) = self.route.nearest(np.array([pose[:2]]))
             if along > furthest:
                 furthest, gained_at = float(along), index
             reason = self._reason(index, pose, deviation, index - gained_at)
@@ -155,4 +161,6 @@ class Agent:
     def _check_inside(self, pose: Pose) -> None:
         field = self.renderer.world.field
         if not np.isfinite(pose).all() or not field.contains(pose.x, pose.y):
-            raise InputError(f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset")
+            raise InputError(
+                f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
+            )

@@ -14,7 +14,9 @@ import tyro
 from world.errors import InputError
 
 NOT_SETTINGS = ("out", "overwrite", "live", "viewer", "json")  # flags of a run that do not change what happens in it
-WORLD = "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
+WORLD = (
+    "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
+)
 
 
 @dataclass
@@ -33,11 +35,14 @@ class WorldCommand:
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        from world.files import write_world
+        from world.files import check_writable, write_world
         from world.scene import World
 
-        if self.picture is not None and self.picture.suffix.lower() not in (".png", ".svg"):
-            raise InputError(f"{self.picture}: a picture from above is written as .png or .svg")
+        check_writable(self.out)
+        if self.picture is not None:
+            check_writable(self.picture)
+            if self.picture.suffix.lower() not in (".png", ".svg"):
+                raise InputError(f"{self.picture}: a picture from above is written as .png or .svg")
         world = World.generate(self.preset, self.seed)
         write_world(world, self.out)
         if self.picture is not None:
@@ -58,6 +63,14 @@ class Sight:
     """Columns x rows of a panorama. A pixel wider than a degree is averaged from several rays."""
     renderer: str = "auto"
     """auto (the fastest here), cpu, egl or osmesa."""
+    samples: int | None = None
+    """Rays along each side of a pixel. Default: 1 where a pixel is at most a degree wide, else 4."""
+    eye_height_m: float = 0.01
+    """Height of the eye above z = 0."""
+    top_deg: float = 60.0
+    """Elevation of a panorama's upper edge."""
+    bottom_deg: float = -15.0
+    """Elevation of its lower edge."""
     cull_back_faces: bool = False
     """See triangles only from their front, as the original Sussex renderer did."""
 
@@ -74,31 +87,32 @@ class Sight:
             world = read_world(self.world)
         return dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
 
-    def open_renderer(self, world, **eye: float):
+    def width_and_height(self) -> tuple[int, int]:
+        """Columns and rows of a panorama."""
+        width, cross, height = self.size.lower().partition("x")
+        if not (cross and width.isdecimal() and height.isdecimal()):
+            raise InputError(f"size {self.size!r}: give columns x rows, for example 720x150")
+        return int(width), int(height)
+
+    def open_renderer(self, world):
         from render import Eye, open_renderer
 
-        width, cross, height = self.size.lower().partition("x")
-        if not (cross and width.isdigit() and height.isdigit()):
-            raise InputError(f"size {self.size!r}: give columns x rows, for example 720x150")
-        renderer = open_renderer(world, Eye(width=int(width), height=int(height), **eye), self.renderer)
-        say(f"renderer: {renderer.backend}")
-        return renderer
+        width, height = self.width_and_height()
+        eye = Eye(
+            width=width, height=height, top=math.radians(self.top_deg), bottom=math.radians(self.bottom_deg),
+            z=self.eye_height_m, samples=self.samples,
+        )  # fmt: skip
+        return open_renderer(world, eye, self.renderer)
 
 
 @dataclass
 class ViewCommand(Sight):
     """Draw the panorama seen at a pose."""
 
-    at: Annotated[str, tyro.conf.arg(metavar="X,Y,HEADING_DEG")] = "5,5,90"
-    """Where to stand (m) and face (degrees counter-clockwise from +x, east). For a negative x: --at=-1,2,90."""
+    at: Annotated[str | None, tyro.conf.arg(metavar="X,Y,HEADING_DEG")] = None
+    """Where to stand (m) and face (degrees counter-clockwise from +x, east). Default: the middle of the world, facing north."""
     out: Path = Path("view.png")
     """PNG to write: ahead in the middle, behind at both edges."""
-    eye_height_m: float = 0.01
-    """Height of the eye above z = 0."""
-    top_deg: float = 60.0
-    """Elevation of the upper edge."""
-    bottom_deg: float = -15.0
-    """Elevation of the lower edge."""
     alpha: bool = False
     """Write RGBA: alpha is the share of each pixel that is not open sky."""
     json: bool = False
@@ -108,25 +122,35 @@ class ViewCommand(Sight):
         import cv2
         import numpy as np
 
-        from world.files import replacing
+        from world.files import check_writable, replacing
 
+        if self.out.suffix.lower() != ".png":
+            raise InputError(f"{self.out}: a view is written as .png")
+        check_writable(self.out)
+        world = self.open_world()
+        x, y, heading_deg = self.place(world.field)
+        with self.open_renderer(world) as renderer:
+            view = renderer.render([(x, y, math.radians(heading_deg))])[0]
+            backend = renderer.backend
+        say(f"renderer: {backend}")
+        image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
+        with replacing(self.out) as partial:
+            partial.write_bytes(
+                cv2.imencode(".png", image if self.alpha else np.ascontiguousarray(image[..., :3]))[1].tobytes()
+            )
+        return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
+
+    def place(self, field) -> tuple[float, float, float]:
+        """x, y (m) and heading (degrees) to look from."""
+        if self.at is None:
+            return (field.x_min + field.x_max) / 2, (field.y_min + field.y_max) / 2, 90.0
         try:
             x, y, heading_deg = (float(number) for number in self.at.split(","))
         except ValueError:
             raise InputError(f"--at {self.at!r}: give X,Y,HEADING_DEG, for example 5,5,90") from None
-        if self.out.suffix.lower() != ".png":
-            raise InputError(f"{self.out}: a view is written as .png")
-        world = self.open_world()
-        if not (math.isfinite(heading_deg) and world.field.contains(x, y)):
-            raise InputError(f"--at {self.at}: that is outside the world ({world.field}); choose a place inside")
-        eye = {"z": self.eye_height_m, "top": math.radians(self.top_deg), "bottom": math.radians(self.bottom_deg)}
-        with self.open_renderer(world, **eye) as renderer:
-            view = renderer.render([(x, y, math.radians(heading_deg))])[0]
-            backend = renderer.backend
-        image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
-        with replacing(self.out) as partial:
-            partial.write_bytes(cv2.imencode(".png", image if self.alpha else np.ascontiguousarray(image[..., :3]))[1].tobytes())
-        return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
+        if not (math.isfinite(heading_deg) and field.contains(x, y)):
+            raise InputError(f"--at {self.at}: that is outside the world ({field}); choose a place inside")
+        return x, y, heading_deg
 
 
 @dataclass
@@ -159,16 +183,19 @@ class Learning(Sight):
         from .models import make_model
 
         model = make_model(self.model, self.seed)
-        width = int(self.size.lower().partition("x")[0]) if self.size[:1].isdigit() else 120
-        automatic = 1.0 if "|" in self.encoding else max(1.0, width / 120)
-        encoding = Encoding.named(self.encoding, resize=automatic if self.resize is None else self.resize, blur=self.blur)
+        automatic = 1.0 if "|" in self.encoding else max(1.0, self.width_and_height()[0] / 120)
+        encoding = Encoding.named(
+            self.encoding, resize=automatic if self.resize is None else self.resize, blur=self.blur
+        )
         route = read_route(self.route) if self.route else None
         world = self.open_world()
         route = (route or generate_route(world, self.seed)).resampled(self.spacing_m)
         inside = world.field.contains(*route.xy.T)
         if not inside.all():
             x, y = route.xy[~inside][0]
-            raise InputError(f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world")
+            raise InputError(
+                f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
+            )
         return world, route, encoding, model
 
     def learn(self, model, encoding, renderer, route):
@@ -176,6 +203,7 @@ class Learning(Sight):
         from .training import learn, training_poses
 
         poses = training_poses(route, every=self.every, learning_walk=self.learning_walk_m, field=renderer.world.field)
+        say(f"renderer: {renderer.backend}")
         with progress("learning", "views") as report:
             return learn(model, encoding, renderer, poses, report)
 
@@ -254,8 +282,10 @@ class RunCommand(Learning):
 
     def run(self) -> dict[str, Any]:
         from .agent import Agent
-        from .runs import claim, record_walk
+        from .runs import check_free, claim, record_walk
 
+        viewer = self.viewer if self.live else None
+        check_free(self.out, overwrite=self.overwrite, viewer=viewer)
         check_scan_deg(self.scan_deg)
         if self.on_lost not in ("stop", "reset"):
             raise InputError(f"--on-lost {self.on_lost!r}: give stop or reset")
@@ -269,15 +299,14 @@ class RunCommand(Learning):
                 patience=self.patience_m, max_steps=self.max_steps, reset_when_lost=self.on_lost == "reset", seed=self.seed,
             )  # fmt: skip
             start = agent.start(self.offset_m)
-            claim(self.out, overwrite=self.overwrite, viewer=self.viewer if self.live else None)
+            claim(self.out)
             poses = self.learn(model, encoding, renderer, route)
             settings = {key: value for key, value in dataclasses.asdict(self).items() if key not in NOT_SETTINGS}
             settings |= {"encoding": str(encoding), "renderer": renderer.backend, "n_views": len(poses)}
             with progress("walking", "steps") as report:
                 return record_walk(
-                    agent, start, self.out, training_poses=poses, settings=settings,
-                    viewer=self.viewer if self.live else None, progress=report,
-                )  # fmt: skip
+                    agent, start, self.out, training_poses=poses, settings=settings, viewer=viewer, progress=report
+                )
 
 
 @dataclass
@@ -328,7 +357,13 @@ def progress(what: str, unit: str):
 
     @contextmanager
     def shown():
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(unit), TimeRemainingColumn())
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn(unit),
+            TimeRemainingColumn(),
+        )
         console = Console(stderr=True)
         with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
             task = bar.add_task(what, total=None)

@@ -5,7 +5,6 @@ treats the panorama as the ring it is, so that turning the eye rolls the feature
 factor divides the turn and the width).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
@@ -66,7 +65,9 @@ class Blur:
         margin = int(np.ceil(4 * self.sigma))
         wrapped = np.pad(images, ((0, 0), (0, 0), (margin, margin)), mode="wrap")
         size = 2 * margin + 1
-        blurred = [cv2.GaussianBlur(image, (size, size), self.sigma, borderType=cv2.BORDER_REFLECT) for image in wrapped]
+        blurred = [
+            cv2.GaussianBlur(image, (size, size), self.sigma, borderType=cv2.BORDER_REFLECT) for image in wrapped
+        ]
         return np.stack(blurred)[:, :, margin:-margin] if len(images) else images
 
 
@@ -81,7 +82,7 @@ class Resize:
         if not 1 <= self.factor <= 1000:
             raise InputError(f"resize {self.factor:g}: give a factor from 1 (as it is) up to 1000")
 
-    def __call__(self, images: Images) -> Images:
+    def __call__(self, images: Images) -> Float32[np.ndarray, "n rows columns"]:
         n, height, width = images.shape
         h, w = max(1, round(height / self.factor)), max(4, round(width / self.factor))
         if (h, w) == (height, width) or n == 0:
@@ -113,9 +114,9 @@ class Normalise:
         return centred / np.where(deviation > 1e-6, deviation, np.inf)
 
 
-Step = Callable[[np.ndarray], np.ndarray]
-SOURCES = {step.word: step for step in (Grey, SkyMask)}
-FILTERS = {step.word: step for step in (Blur, Resize, VerticalEdges, Normalise)}
+Step = Grey | SkyMask | Blur | Resize | VerticalEdges | Normalise
+SOURCES: dict[str, type[Step]] = {step.word: step for step in (Grey, SkyMask)}
+FILTERS: dict[str, type[Step]] = {step.word: step for step in (Blur, Resize, VerticalEdges, Normalise)}
 PRESETS = {
     "grey": "grey | {blur}{resize}",
     "sky": "sky-mask | {blur}{resize}normalise",
@@ -144,7 +145,9 @@ class Encoding:
         return images.astype(np.float32, copy=False)
 
     def __str__(self) -> str:
-        return " | ".join(" ".join([step.word, *(f"{getattr(step, f.name):g}" for f in fields(step))]) for step in self.steps)
+        return " | ".join(
+            " ".join([step.word, *(f"{getattr(step, f.name):g}" for f in fields(step))]) for step in self.steps
+        )
 
     @classmethod
     def parse(cls, text: str) -> "Encoding":
@@ -162,7 +165,9 @@ class Encoding:
             except ValueError:
                 values = []
             if len(values) != takes or len(numbers) != takes:
-                raise InputError(f"encoding {text!r}: {word} takes {takes or 'no'} number{'s' * (takes != 1)}, got {part.strip()!r}")
+                raise InputError(
+                    f"encoding {text!r}: {word} takes {takes or 'no'} number{'s' * (takes != 1)}, got {part.strip()!r}"
+                )
             steps.append(known[word](*values))
         return cls(tuple(steps))
 
@@ -174,7 +179,9 @@ class Encoding:
                 raise InputError(f"encoding {name!r} is spelled out: put resize and blur into it instead of beside it")
             return cls.parse(name)
         if name not in PRESETS:
-            raise InputError(f"unknown encoding {name!r}; known: {', '.join(PRESETS)}, or a chain such as '{PRESETS['grey'][:7]}resize 6'")
+            raise InputError(
+                f"unknown encoding {name!r}; known: {', '.join(PRESETS)}, or a chain such as '{PRESETS['grey'][:7]}resize 6'"
+            )
         text = PRESETS[name].format(
             blur=f"blur {blur:g} | " if blur else "", resize=f"resize {resize:g} | " if resize != 1 else ""
         )

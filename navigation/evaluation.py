@@ -55,7 +55,9 @@ def grid_positions(route: Route, *, grid: float, within: float, field: Bounds) -
     distance, _ = route.nearest(xy) if len(xy) else (np.empty(0), None)
     xy = xy[(distance <= within) & field.contains(xy[:, 0], xy[:, 1])]
     if len(xy) == 0:
-        raise InputError(f"no multiple of {grid:g} m lies within {within:g} m of the route; give a finer grid or more room")
+        raise InputError(
+            f"no multiple of {grid:g} m lies within {within:g} m of the route; give a finer grid or more room"
+        )
     return xy
 
 
@@ -83,4 +85,6 @@ def heading_errors(
         windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted[part]])
         headings[part] = best_turn(familiarity, windows, interpolate)
         progress(min(start + BATCH, len(positions)), len(positions))
-    return HeadingErrors(positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted)))
+    return HeadingErrors(
+        positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted))
+    )

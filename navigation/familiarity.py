@@ -50,7 +50,9 @@ def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
     if shape is None:
         raise InputError("this model has learned nothing yet; call fit(views) first")
     if views.ndim != 3 or tuple(views.shape[1:]) != tuple(shape):
-        raise InputError(f"this model learned views of shape {tuple(shape)}, got {tuple(views.shape[1:])}; encode both alike")
+        raise InputError(
+            f"this model learned views of shape {tuple(shape)}, got {tuple(views.shape[1:])}; encode both alike"
+        )
     check_finite(views)
 
 

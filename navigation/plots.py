@@ -23,15 +23,30 @@ def draw_world(axes: Axes, world: World) -> None:
     """Draw a world from above, to scale (m)."""
     triangles, rgb = world.surfaces()
     order = triangles[..., 2].max(axis=1).argsort(kind="stable")  # low things first, so that high ones cover them
-    axes.add_collection(PolyCollection(triangles[order, :, :2], facecolors=rgb[order] / 255, edgecolors="none", antialiased=False, rasterized=True))
+    axes.add_collection(
+        PolyCollection(
+            list(triangles[order, :, :2]),
+            facecolors=rgb[order] / 255,
+            edgecolors="none",
+            antialiased=False,
+            rasterized=True,
+        )
+    )
     x0, y0, x1, y1 = world.field
     margin = 0.04 * max(x1 - x0, y1 - y0)
-    axes.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), xlabel="x, east (m)", ylabel="y, north (m)")
+    axes.set(
+        xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), xlabel="x, east (m)", ylabel="y, north (m)"
+    )
     axes.set_aspect("equal")
 
 
 def overview(
-    world: World, path: str | os.PathLike, *, route: Route | None = None, walk: Float[np.ndarray, "n 2"] | None = None, title: str = ""
+    world: World,
+    path: str | os.PathLike,
+    *,
+    route: Route | None = None,
+    walk: Float[np.ndarray, "n 2"] | None = None,
+    title: str = "",
 ) -> None:
     """Write a picture (.png or .svg) of a world from above, with a route and the path an agent took."""
     figure = Figure(figsize=(8, 8.4), layout="constrained")

@@ -56,17 +56,27 @@ class Recording:
         stream, pose = self._stream, step.pose
         stream.set_time(TIMELINE, sequence=step.index)
         here = [pose.x, pose.y, ABOVE]
-        stream.log("world/agent", rr.Arrows3D(origins=[here], vectors=[_direction(pose.heading + step.turn, 0.2)], colors=PATH_COLOUR, radii=0.012))
+        stream.log(
+            "world/agent",
+            rr.Arrows3D(
+                origins=[here], vectors=[_direction(pose.heading + step.turn, 0.2)], colors=PATH_COLOUR, radii=0.012
+            ),
+        )
         if self._previous is not None and step.reset is None:
             before = self._previous.pose
-            stream.log("world/path", rr.LineStrips3D([[[before.x, before.y, ABOVE], here]], colors=PATH_COLOUR, radii=0.008))
+            stream.log(
+                "world/path", rr.LineStrips3D([[[before.x, before.y, ABOVE], here]], colors=PATH_COLOUR, radii=0.008)
+            )
         stream.log("view", rr.Image(step.view[..., :3]))
         self._log_match(step)
         width = len(step.familiarity)
         order = np.argsort(-turn_of_columns(np.arange(width), width))
         degrees_right = -np.degrees(turn_of_columns(order, width))
         # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
-        stream.log("familiarity", rr.BarChart(step.familiarity[order] - step.familiarity.min(), abscissa=degrees_right, color=MATCH_COLOUR))
+        stream.log(
+            "familiarity",
+            rr.BarChart(step.familiarity[order] - step.familiarity.min(), abscissa=degrees_right, color=MATCH_COLOUR),
+        )
         stream.log("deviation/m", rr.Scalars(step.deviation))
         stream.log("error/degrees", rr.Scalars(np.degrees(step.error)))
         event = step.reason or (step.reset and f"{step.reset}: put back on the route")
@@ -92,12 +102,18 @@ class Recording:
         log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         triangles, rgb = world.surfaces()
         colours = np.repeat(rgb, 3, axis=0)
-        mesh = rr.Mesh3D(vertex_positions=triangles.reshape(-1, 3), vertex_colors=colours, vertex_normals=_up(len(colours)))
+        mesh = rr.Mesh3D(
+            vertex_positions=triangles.reshape(-1, 3), vertex_colors=colours, vertex_normals=_up(len(colours))
+        )
         log("world/mesh", mesh, static=True)
         strip = np.column_stack([route.xy, np.full(len(route.xy), ABOVE)])
         log("world/route", rr.LineStrips3D([strip], colors=ROUTE_COLOUR, radii=0.008), static=True)
         goal = [*route.xy[-1], ABOVE]
-        log("world/goal", rr.Points3D([goal], colors=ROUTE_COLOUR, radii=0.06, labels=["goal"], show_labels=True), static=True)
+        log(
+            "world/goal",
+            rr.Points3D([goal], colors=ROUTE_COLOUR, radii=0.06, labels=["goal"], show_labels=True),
+            static=True,
+        )
         if self._training_poses is not None:
             points = np.column_stack([self._training_poses[:, :2], np.full(len(self._training_poses), ABOVE)])
             log("world/learned_views", rr.Points3D(points, colors=LEARNED_COLOUR, radii=0.006), static=True)
@@ -112,7 +128,9 @@ class Recording:
             return
         x, y, heading = self._training_poses[step.match]
         self._stream.log("recognised", rr.Image(self._renderer.render(self._training_poses[[step.match]])[0, ..., :3]))
-        arrow = rr.Arrows3D(origins=[[x, y, ABOVE]], vectors=[_direction(heading, 0.15)], colors=MATCH_COLOUR, radii=0.008)
+        arrow = rr.Arrows3D(
+            origins=[[x, y, ABOVE]], vectors=[_direction(heading, 0.15)], colors=MATCH_COLOUR, radii=0.008
+        )
         self._stream.log("world/recognised", arrow)
 
 
@@ -138,7 +156,9 @@ def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
     """Where things are shown: the world to the left, what the agent sees and thinks to the right."""
     middle = (route.xy.min(axis=0) + route.xy.max(axis=0)) / 2
     reach = max(float(np.ptp(route.xy, axis=0).max()), 1.0)
-    so_far = rrb.VisibleTimeRanges(timeline=TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative())
+    so_far = rrb.VisibleTimeRanges(
+        timeline=TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
+    )
     world = rrb.Spatial3DView(
         origin="world", name="World, route (blue) and path (red)",
         overrides={"world/path": so_far},
@@ -152,7 +172,9 @@ def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
         rrb.Spatial2DView(origin="view", name="What the agent sees (ahead is the middle)"),
         rrb.Spatial2DView(origin="recognised", name="The learned view it recognises"),
         rrb.BarChartView(origin="familiarity", name="Familiarity by degrees to the right"),
-        rrb.TimeSeriesView(origin="deviation", name="Deviation from the route (m)", axis_y=rrb.ScalarAxis(range=(0.0, lost))),
+        rrb.TimeSeriesView(
+            origin="deviation", name="Deviation from the route (m)", axis_y=rrb.ScalarAxis(range=(0.0, lost))
+        ),
         rrb.TimeSeriesView(origin="error", name="Heading error (degrees)", axis_y=rrb.ScalarAxis(range=(-90.0, 90.0))),
         rrb.TextLogView(origin="events", name="Events"),
     ]

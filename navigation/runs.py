@@ -22,29 +22,42 @@ from .plots import overview
 from .recording import Recording, check_viewer
 from .trajectory import Trajectory
 
-RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = "recording.rrd", "trajectory.csv", "summary.json", "overview.png", "route.csv"
+RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
+    "recording.rrd",
+    "trajectory.csv",
+    "summary.json",
+    "overview.png",
+    "route.csv",
+)
 FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE)
 
 
-def claim(out: Path, *, overwrite: bool = False, viewer: str | None = None) -> None:
-    """Make the folder of a run, empty of earlier runs. Raises InputError where it cannot be written or holds one.
-
-    viewer: address of a viewer that must be listening, or None. Nothing is touched when it is not.
-    """
+def check_free(out: Path, *, overwrite: bool = False, viewer: str | None = None) -> None:
+    """Refuse a folder that holds a run (unless it is to be overwritten), or a viewer that does not listen; touch nothing."""
     if viewer is not None:
         check_viewer(viewer)
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; give a folder for the run")
-    earlier = [out / name for name in FILES if (out / name).exists()]
+    earlier = _run_files(out)
     if earlier and not overwrite:
-        raise InputError(f"{out} already holds a run ({earlier[0].name}); give another --out, or --overwrite to replace it")
+        raise InputError(
+            f"{out} already holds a run ({earlier[0].name}); give another --out, or --overwrite to replace it"
+        )
+
+
+def claim(out: Path) -> None:
+    """Make the folder of a run, without the files of an earlier one. Raises InputError where it cannot be written."""
     try:
         out.mkdir(parents=True, exist_ok=True)
+        for path in _run_files(out):
+            path.unlink()
         (out / RECORDING).touch()
     except OSError as error:
         raise InputError(f"{out} cannot be written ({error.strerror}); give another --out") from error
-    for path in earlier:
-        path.unlink()
+
+
+def _run_files(out: Path) -> list[Path]:
+    return [out / name for name in FILES if (out / name).exists()]
 
 
 def record_walk(
@@ -59,8 +72,14 @@ def record_walk(
     world, route, trajectory = agent.renderer.world, agent.route, Trajectory()
     began = time.perf_counter()
     with Recording(
-        out / RECORDING, world, route, renderer=agent.renderer, training_poses=training_poses,
-        lost=agent.lost, live=viewer, title=_about(settings),
+        out / RECORDING,
+        world,
+        route,
+        renderer=agent.renderer,
+        training_poses=training_poses,
+        lost=agent.lost,
+        live=viewer,
+        title=_about(settings),
     ) as recording:
         for step in agent.walk(start):
             recording.log(step)
@@ -68,7 +87,7 @@ def record_walk(
             progress(step.index, agent.step_limit)
     seconds = time.perf_counter() - began
     summary = trajectory.summary()
-    summary |= {"seconds": seconds, "steps_per_second": summary["steps"] / seconds, "recording": RECORDING}
+    summary |= {"seconds": seconds, "steps_per_second": (len(trajectory) - 1) / seconds, "recording": RECORDING}
     trajectory.write(out / TRAJECTORY)
     write_route(route, out / ROUTE)
     title = f"{summary['reason']} after {summary['steps']} steps, {summary['mean_deviation_m']:.3f} m off the route on average"
@@ -100,7 +119,9 @@ def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dic
             done = subprocess.run([*command, *options], env=environment, capture_output=True, text=True)
             if not partial.exists():
                 lines = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-                raise InputError(f"the viewer drew no picture ({lines}); it needs Vulkan (Debian: mesa-vulkan-drivers libvulkan1)")
+                raise InputError(
+                    f"the viewer drew no picture ({lines}); it needs Vulkan (Debian: mesa-vulkan-drivers libvulkan1)"
+                )
         return {"recording": str(recording), "screenshot": str(screenshot)}
     if web:
         command.append("--web-viewer")
@@ -114,4 +135,6 @@ def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dic
 
 def _about(settings: dict[str, Any] | None) -> str:
     """Settings as a markdown list."""
-    return "\n".join(f"- **{key.replace('_', ' ')}**: {value}" for key, value in (settings or {}).items() if value is not None)
+    return "\n".join(
+        f"- **{key.replace('_', ' ')}**: {value}" for key, value in (settings or {}).items() if value is not None
+    )

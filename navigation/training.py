@@ -7,7 +7,6 @@ import torch
 from jaxtyping import Float
 
 from render.renderer import Renderer
-
 from world.errors import InputError
 from world.geometry import Bounds, Route, wrap_angle
 
@@ -20,7 +19,9 @@ BATCH = 64  # views rendered and encoded at once
 BLANK = 1e-3  # standard deviation under which a feature image holds nothing to recognise
 
 
-def training_poses(route: Route, *, every: int = 1, learning_walk: float = 0.0, field: Bounds | None = None) -> Float[np.ndarray, "n 3"]:
+def training_poses(
+    route: Route, *, every: int = 1, learning_walk: float = 0.0, field: Bounds | None = None
+) -> Float[np.ndarray, "n 3"]:
     """Poses to learn from: every `every`-th of the route's, and, beside each, those of a learning walk.
 
     learning_walk: reach to both sides (m); 0 is training on the route only, as the thesis does. Views taken on the route face
@@ -69,6 +70,8 @@ def learn(
         kept.append(part[seen.numpy()])
         progress(min(start + BATCH, len(poses)), len(poses))
     if not sum(map(len, kept)):
-        raise InputError(f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})")
+        raise InputError(
+            f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})"
+        )
     model.fit(torch.cat(images))
     return np.concatenate(kept)

@@ -44,7 +44,9 @@ class Renderer(Protocol):
 
     def __enter__(self) -> "Renderer": ...
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None: ...
 
 
 def open_renderer(world: World, eye: Eye | None = None, backend: str = "auto") -> Renderer:

@@ -16,6 +16,7 @@ Nothing is projected or interpolated: every pixel is what a ray caster finds.
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numba
 import numpy as np
@@ -30,7 +31,9 @@ from .renderer import Poses, as_poses
 
 # atan(x) / x as a polynomial in x^2 on [0, 1], within 2e-7: enough to find candidate columns, which exact tests follow.
 _x = np.cos(np.pi * (np.arange(200) + 0.5) / 400)
-_A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7 = (float(c) for c in np.polynomial.polynomial.polyfit(_x**2, np.arctan(_x) / _x, 7))
+_A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7 = (
+    float(c) for c in np.polynomial.polynomial.polyfit(_x**2, np.arctan(_x) / _x, 7)
+)
 _ATAN_ERROR = 1e-6
 
 
@@ -113,7 +116,9 @@ def _draw(triangles, columns, cull, eye, cosines, sines, tangents, table, start,
     seen[start:stop] = -1
     a, b, c = np.empty(3), np.empty(3), np.empty(3)
     p, q = np.empty(3), np.empty(3)  # an edge's bound on t is p cos + q sin
-    side = np.empty(3, np.int64)  # +1: a lower bound, -1: an upper, 0: the edge's plane is vertical, p cos + q sin >= 0 is the test
+    side = np.empty(
+        3, np.int64
+    )  # +1: a lower bound, -1: an upper, 0: the edge's plane is vertical, p cos + q sin >= 0 is the test
     for i in range(triangles.shape[0]):
         first, last = _column_range(columns[0, i], columns[1, i], columns[2, i], width)
         if first > last or (first >= stop and last < start + width) or (last < start):
@@ -214,7 +219,9 @@ class ScanlineRenderer:
         self._triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         self._x, self._y = (np.ascontiguousarray(self._triangles[:, :, axis].T) for axis in (0, 1))  # (3, n)
         covered = np.column_stack([rgb, np.full(len(rgb), 255)])
-        self._rgba = np.vstack([covered, [*world.sky_rgb, 0]]).astype(np.uint8)  # what nothing covers is seen as index -1
+        self._rgba = np.vstack([covered, [*world.sky_rgb, 0]]).astype(
+            np.uint8
+        )  # what nothing covers is seen as index -1
         rays = eye.rays
         self._azimuths = column_azimuths(eye.width * rays)
         elevations = eye.elevations(rays)
@@ -235,7 +242,7 @@ class ScanlineRenderer:
             return views
         if len(poses) == 1:
             edges = np.linspace(0, self.eye.width, self._threads + 1).astype(int)
-            jobs = [(poses, views, int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if a < b]
+            jobs = [(poses, views, int(a), int(b)) for a, b in pairwise(edges) if a < b]
         else:
             shares = np.array_split(np.arange(len(poses)), self._threads)
             jobs = [(poses[s[0] : s[-1] + 1], views[s[0] : s[-1] + 1], 0, self.eye.width) for s in shares if len(s)]

@@ -18,11 +18,15 @@ SUFFIXES = (".glb", ".ply")
 
 def same(a: World, b: World) -> bool:
     arrays = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("triangles", "rgb"))
-    return arrays and all(getattr(a, name) == getattr(b, name) for name in ("ground", "sky_rgb", "field", "double_sided", "origin"))
+    return arrays and all(
+        getattr(a, name) == getattr(b, name) for name in ("ground", "sky_rgb", "field", "double_sided", "origin")
+    )
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-@pytest.mark.parametrize("world", [World.generate("tiny", 5), random_world(double_sided=False), random_world(ground=False)])
+@pytest.mark.parametrize(
+    "world", [World.generate("tiny", 5), random_world(double_sided=False), random_world(ground=False)]
+)
 def test_a_world_comes_back_whole_and_the_same_bytes_twice(tmp_path, suffix, world):
     for name in ("a", "b"):
         write_world(world, tmp_path / (name + suffix))
@@ -65,7 +69,9 @@ def test_vertex_colours_of_foreign_meshes_become_triangle_colours(tmp_path, suff
 
 def test_face_colours_of_foreign_meshes_are_kept(tmp_path):
     box = trimesh.creation.box()
-    box.visual.face_colors = np.column_stack([np.arange(12) * 20, np.arange(12), 255 - np.arange(12), np.full(12, 255)]).astype(np.uint8)
+    box.visual.face_colors = np.column_stack(
+        [np.arange(12) * 20, np.arange(12), 255 - np.arange(12), np.full(12, 255)]
+    ).astype(np.uint8)
     box.export(tmp_path / "box.ply")
     assert np.array_equal(read_world(tmp_path / "box.ply").rgb, box.visual.face_colors[:, :3])
 

@@ -37,7 +37,8 @@ def test_columns_run_clockwise_from_behind_with_ahead_in_the_middle():
     azimuths = column_azimuths(720)
     assert np.all(np.diff(azimuths) < 0)
     assert np.allclose(azimuths, -azimuths[::-1])
-    assert np.isclose(azimuths[359], -azimuths[360]) and azimuths[359] > 0  # ahead lies between the two, left first
+    assert np.isclose(azimuths[359], -azimuths[360])  # ahead lies between the two ..
+    assert azimuths[359] > 0  # .. left first
     assert np.isclose(turn_of_columns(180, 720), np.pi / 2)
 
 

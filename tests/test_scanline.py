@@ -22,7 +22,9 @@ def embree(world: World, eye: Eye, pose) -> np.ndarray:
     triangles, rgb = world.surfaces()
     mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
     azimuth, elevation = pose[2] + column_azimuths(eye.width), eye.elevations()[:, None]
-    towards = np.broadcast_arrays(np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+    towards = np.broadcast_arrays(
+        np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)
+    )
     towards = np.stack(towards, axis=-1).reshape(-1, 3)
     hit = mesh.ray.intersects_first(np.broadcast_to([pose[0], pose[1], eye.z], towards.shape), towards)
     hit = hit.reshape(eye.height, eye.width)
@@ -92,7 +94,9 @@ def test_a_view_does_not_change_when_world_and_pose_move_together(renderer):
     world, angle, shift = renderer.world, 0.7, np.array([0.5, -0.25, 0])
     c, s = np.cos(angle), np.sin(angle)
     rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    moved = World(**{**vars(world), "triangles": (world.triangles @ rotation.T + shift).astype(np.float32), "ground": None})
+    moved = World(
+        **{**vars(world), "triangles": (world.triangles @ rotation.T + shift).astype(np.float32), "ground": None}
+    )
     still = World(**{**vars(world), "ground": None})
     with open_renderer(moved, renderer.eye, "cpu") as of_moved, open_renderer(still, renderer.eye, "cpu") as of_still:
         for x, y, heading in random_poses(5):
@@ -165,7 +169,13 @@ def test_poses_that_are_not_finite_are_refused(renderer, pose):
 
 
 @pytest.mark.parametrize(
-    ("eye", "message"), [({"width": 0}, "0 x 150"), ({"height": 0}, "720 x 0"), ({"top": -1.0}, "bottom < top"), ({"samples": 0}, "samples")]
+    ("eye", "message"),
+    [
+        ({"width": 0}, "0 x 150"),
+        ({"height": 0}, "720 x 0"),
+        ({"top": -1.0}, "bottom < top"),
+        ({"samples": 0}, "samples"),
+    ],
 )
 def test_eyes_that_see_nothing_are_refused(eye, message):
     with pytest.raises(InputError, match=message):

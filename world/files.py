@@ -32,16 +32,23 @@ ROUTE_HEADER = ["x_m", "y_m", "heading_deg"]
 def replacing(path: str | os.PathLike) -> Iterator[Path]:
     """A temporary path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not."""
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give the name of a file to write")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {path.parent}; create it first")
+    check_writable(path)
     partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
     try:
         yield partial
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a path that no file can be written to: a folder, or in a folder that is not there. Raises InputError."""
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give the name of a file to write")
+    if not path.parent.is_dir():
+        raise InputError(f"{path} cannot be written: there is no folder {path.parent}; create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path} cannot be written: the folder {path.parent} is read-only; choose another")
 
 
 def read_world(path: str | os.PathLike) -> World:
@@ -74,7 +81,9 @@ def read_world(path: str | os.PathLike) -> World:
     try:
         return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(kept))
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: its {KEY} metadata cannot be used ({_reason(error)}); write the world again") from error
+        raise InputError(
+            f"{path}: its {KEY} metadata cannot be used ({_reason(error)}); write the world again"
+        ) from error
 
 
 def write_world(world: World, path: str | os.PathLike) -> None:
@@ -93,14 +102,17 @@ def write_world(world: World, path: str | os.PathLike) -> None:
     n = len(world.triangles)
     rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
     mesh = trimesh.Trimesh(
-        world.triangles.reshape(-1, 3), np.arange(3 * n).reshape(n, 3), vertex_colors=np.repeat(rgba, 3, axis=0), process=False
+        world.triangles.reshape(-1, 3),
+        np.arange(3 * n).reshape(n, 3),
+        vertex_colors=np.repeat(rgba, 3, axis=0),
+        process=False,
     )
     if suffix == ".glb":
         scene = trimesh.Scene(list(world.textured) or [mesh])
         scene.metadata[KEY] = _to_json(world)
-        data = scene.export(file_type="glb")
+        data = bytes(scene.export(file_type="glb"))  # type: ignore[arg-type]
     else:
-        data = mesh.export(file_type="ply")
+        data = bytes(mesh.export(file_type="ply"))  # type: ignore[arg-type]
         head, first_element, rest = data.partition(b"element vertex")
         data = head + f"comment {KEY} {json.dumps(_to_json(world))}\n".encode("ascii") + first_element + rest
     with replacing(path) as partial:
@@ -115,7 +127,9 @@ def read_route(path: str | os.PathLike) -> Route:
     path = _existing(path, "route")
     suffix = path.suffix.lower()
     if suffix not in (".csv", ".bin"):
-        raise InputError(f"{path}: unknown kind of route {suffix!r}; give .csv ({','.join(ROUTE_HEADER)}) or AntWorld .bin")
+        raise InputError(
+            f"{path}: unknown kind of route {suffix!r}; give .csv ({','.join(ROUTE_HEADER)}) or AntWorld .bin"
+        )
     try:
         if suffix == ".csv":
             return _read_route_csv(path)
@@ -161,10 +175,14 @@ def _read_antworld(path: Path) -> World:
     planes = _read_planes(path, 12, "an AntWorld world")
     bad = np.flatnonzero(~np.isfinite(planes).all(axis=0))
     if len(bad):
-        raise InputError(f"{path}: triangle {bad[0]} holds a number that is not finite; a world needs finite metres and colours")
+        raise InputError(
+            f"{path}: triangle {bad[0]} holds a number that is not finite; a world needs finite metres and colours"
+        )
     shade = planes[9:]
     if shade.min() < 0 or shade.max() > 1:
-        raise InputError(f"{path}: colours run from {shade.min():g} to {shade.max():g}; an AntWorld world has 0..1 (is it a world?)")
+        raise InputError(
+            f"{path}: colours run from {shade.min():g} to {shade.max():g}; an AntWorld world has 0..1 (is it a world?)"
+        )
     triangles = planes[:9].reshape(3, 3, -1).transpose(2, 1, 0)  # (xyz, corner, n) -> (n, corner, xyz)
     rgb = np.rint(255 * shade.T * ANTWORLD_TINT).astype(np.uint8)
     (x0, y0), (x1, y1) = triangles[..., :2].min(axis=(0, 1)).tolist(), triangles[..., :2].max(axis=(0, 1)).tolist()
@@ -181,7 +199,9 @@ def _read_route_csv(path: Path) -> Route:
         header = [name.strip() for name in next(reader, [])]
         columns = [name for name in ROUTE_HEADER if name in header]
         if columns[:2] != ROUTE_HEADER[:2]:
-            raise InputError(f"{path}, line 1: the columns are {','.join(header)!r}; a route needs {','.join(ROUTE_HEADER)}")
+            raise InputError(
+                f"{path}, line 1: the columns are {','.join(header)!r}; a route needs {','.join(ROUTE_HEADER)}"
+            )
         rows = []
         for cells in reader:
             if not any(cell.strip() for cell in cells):
@@ -262,7 +282,9 @@ def _face_rgb(mesh) -> UInt8[np.ndarray, "n 3"]:
     return np.asarray(mesh.visual.face_colors)[:, :3].astype(np.uint8)
 
 
-def _mean_of_texture(image: UInt8[np.ndarray, "h w 3"], uv: Float32[np.ndarray, "n 3 2"], side: int = 16) -> UInt8[np.ndarray, "n 3"]:
+def _mean_of_texture(
+    image: UInt8[np.ndarray, "h w 3"], uv: Float32[np.ndarray, "n 3 2"], side: int = 16
+) -> UInt8[np.ndarray, "n 3"]:
     """Mean colour of an image over triangles in texture space (u right, v up, both wrapping), from side^2 places in each."""
     steps = (np.arange(side) + 0.5) / side
     u, v = (grid.ravel() for grid in np.meshgrid(steps, steps))

@@ -134,7 +134,9 @@ class Route:
     def resampled(self, spacing: float) -> "Route":
         """The route with a pose every `spacing` metres of arc length, from its start."""
         if not (np.isfinite(spacing) and 0 < spacing <= self.length):
-            raise InputError(f"spacing {spacing:g} m does not fit a route of {self.length:.3f} m; give 0 < spacing <= length")
+            raise InputError(
+                f"spacing {spacing:g} m does not fit a route of {self.length:.3f} m; give 0 < spacing <= length"
+            )
         return Route(self.at(np.arange(0.0, self.length * (1 + 1e-12), spacing)))
 
     def nearest(self, xy: Float[np.ndarray, "k 2"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:

@@ -1,6 +1,7 @@
 """The world: coloured triangles, a ground and a sky."""
 
-from dataclasses import dataclass, field
+import dataclasses
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class World:
     sky_rgb: RGB
     field: Bounds
     double_sided: bool = True
-    origin: dict[str, Any] = field(default_factory=dict)
+    origin: dict[str, Any] = dataclasses.field(default_factory=dict)
     textured: tuple[Any, ...] = ()
 
     def __post_init__(self):

@@ -58,10 +58,12 @@ class MLP:
         self._bank = FilterBank(weights.reshape(self.hidden, *self.shape))
         return self
 
-    def training_data(self, views: Images) -> tuple[Images, Float32[torch.Tensor, " n"]]:
+    def training_data(self, views: Images) -> tuple[Float32[torch.Tensor, "2*n h w"], Float32[torch.Tensor, " 2*n"]]:
         """Views and their turned copies (first right, then left, and so on), labelled 1 and 0."""
         columns = round(self.negative_turn / (2 * np.pi) * views.shape[-1])
-        turned = torch.stack([torch.roll(view, columns if i % 2 else -columns, dims=-1) for i, view in enumerate(views)])
+        turned = torch.stack(
+            [torch.roll(view, columns if i % 2 else -columns, dims=-1) for i, view in enumerate(views)]
+        )
         return torch.cat([views, turned]), torch.cat([torch.ones(len(views)), torch.zeros(len(views))])
 
     def scan(self, views: Images) -> Float32[torch.Tensor, "n w"]:

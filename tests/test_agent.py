@@ -1,0 +1,239 @@
+"""The loop: what a step is, why walks end, and what brings an agent back."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+from scenes import random_poses
+
+from navigation.agent import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Agent
+from navigation.encoding import Encoding
+from navigation.models import PerfectMemory
+from navigation.training import AHEAD, SIDES, learn, training_poses
+from navigation.trajectory import COLUMNS, Trajectory
+from render.eye import Eye
+from render.renderer import open_renderer
+from world.errors import InputError
+from world.geometry import Pose, Route, wrap_angle
+from world.scene import World
+from world.walk import generate_route
+
+ENCODING = Encoding.named("edges", resize=3)
+
+
+class Turner:
+    """A model that always finds the same turn most familiar."""
+
+    def __init__(self, columns: int):
+        self.columns = columns
+
+    def fit(self, views):
+        return self
+
+    def scan(self, views):
+        scan = torch.zeros(len(views), views.shape[-1])
+        scan[:, self.columns] = 1
+        return scan
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    with open_renderer(World.generate("tiny", 2), Eye(width=360, height=60), "cpu") as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def route(renderer):
+    return generate_route(renderer.world, 2).resampled(0.04)
+
+
+@pytest.fixture(scope="module")
+def memory(renderer, route):
+    model = PerfectMemory()
+    learn(model, ENCODING, renderer, training_poses(route, learning_walk=0.2, field=renderer.world.field))
+    return model
+
+
+def agent(renderer, route, model, **settings) -> Agent:
+    return Agent(renderer=renderer, encoding=ENCODING, model=model, route=route, **settings)
+
+
+STRAIGHT = Route.through(np.column_stack([np.linspace(0.5, 2.5, 51), np.full(51, 1.5)]))
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1, -0.1])
+def test_a_learning_walk_brings_the_agent_home(renderer, route, memory, offset):
+    walker = agent(renderer, route, memory)
+    steps = list(walker.walk(walker.start(offset)))
+    assert steps[-1].reason == ARRIVED
+    assert all(step.reason is None for step in steps[:-1])
+    assert np.hypot(steps[-1].pose.x - route.goal.x, steps[-1].pose.y - route.goal.y) <= walker.arrive
+    assert abs(steps[0].deviation - abs(offset)) < 0.02
+    assert np.mean([step.deviation for step in steps]) < 0.05
+
+
+def test_each_step_follows_from_the_one_before(renderer, route, memory):
+    walker = agent(renderer, route, memory, heading_noise=0.1, scan=2.0)
+    steps = list(walker.walk(walker.start()))
+    for number, (step, following) in enumerate(pairwise(steps)):
+        assert step.index == number
+        assert np.allclose(following.pose, step.pose.turned(step.turn).moved(0.05))
+        assert np.isclose(step.deviation, route.nearest(np.array([step.pose[:2]]))[0][0])
+        assert np.isclose(wrap_angle(step.pose.heading + step.turn - route.at(step.along)[0, 2]), step.error)
+        assert np.array_equal(step.view, renderer.render([step.pose])[0])
+
+
+def test_the_same_seed_walks_the_same_and_another_does_not(renderer, route, memory):
+    def path(seed):
+        walker = agent(renderer, route, memory, heading_noise=0.1, seed=seed)
+        return [step.pose for step in walker.walk(walker.start())]
+
+    assert path(3) == path(3)
+    assert path(3) != path(4)
+
+
+def test_noise_has_the_spread_that_was_asked_for(renderer):
+    walker = agent(
+        renderer, STRAIGHT, Turner(0), heading_noise=0.05, lost=9, patience=99, max_steps=60, step_length=0.001
+    )
+    turns = [step.turn for step in walker.walk(walker.start())]
+    assert 0.035 < np.std(turns) < 0.065
+
+
+@pytest.mark.parametrize(
+    ("columns", "settings", "reason"),
+    [
+        (0, {}, ARRIVED),
+        (30, {"lost": 0.3, "scan": 2 * np.pi}, LOST),
+        (30, {"lost": 9, "patience": 1.0, "scan": 2 * np.pi}, STUCK),
+        (30, {"lost": 9, "patience": 9, "max_steps": 12, "scan": 2 * np.pi}, OUT_OF_STEPS),
+        (0, {"arrive": 0.01, "lost": 9}, OUT_OF_WORLD),
+    ],
+)
+def test_walks_end_for_the_reason_they_should(renderer, columns, settings, reason):
+    # 30 of 120 columns to the left at every step is a small square; straight on passes the goal between steps of 7 cm.
+    walker = agent(
+        renderer,
+        STRAIGHT,
+        Turner(columns),
+        **({"step_length": 0.3} | settings if columns else {"step_length": 0.07} | settings),
+    )
+    steps = list(walker.walk(walker.start()))
+    assert steps[-1].reason == reason
+    trajectory = Trajectory()
+    for step in steps:
+        trajectory.add(step)
+    assert trajectory.summary()["reason"] == reason
+    assert trajectory.summary()["steps"] == len(steps) - 1
+
+
+def test_a_lost_agent_is_put_back_after_the_furthest_waypoint_and_gets_home(renderer):
+    # Every step turns 9 degrees to the left: it keeps leaving the route.
+    walker = agent(
+        renderer,
+        STRAIGHT,
+        Turner(3),
+        scan=2 * np.pi,
+        lost=0.1,
+        reset_when_lost=True,
+        step_length=0.05,
+        waypoint_spacing=0.1,
+    )
+    steps = list(walker.walk(walker.start()))
+    assert steps[-1].reason == ARRIVED
+    resets = [(before, after) for before, after in pairwise(steps) if after.reset]
+    assert len(resets) >= 3
+    furthest = 0.0
+    for before, after in resets:
+        assert after.reset == LOST
+        assert before.deviation > 0.1
+        assert after.deviation < 1e-9
+        assert np.isclose(after.pose.heading, 0)
+        waypoint = after.along / 0.1
+        assert np.isclose(waypoint, round(waypoint))
+        assert after.along > furthest
+        furthest = after.along
+    assert not any(step.reason for step in steps[:-1])
+
+
+def test_a_scan_about_a_fixed_direction_keeps_to_it(renderer, route, memory):
+    walker = agent(renderer, route, memory, scan=np.pi / 3, scan_about=1.0, lost=9, max_steps=8)
+    for step in walker.walk(Pose(1.5, 1.5, -2.5)):
+        assert abs(wrap_angle(step.pose.heading + step.turn - 1.0)) <= np.pi / 6 + 2 * np.pi / 120
+
+
+def test_a_start_outside_the_world_is_refused(renderer, route, memory):
+    with pytest.raises(InputError, match="outside the world"):
+        agent(renderer, route, memory).start(50.0)
+    with pytest.raises(InputError, match="outside the world"):
+        next(agent(renderer, route, memory).walk(Pose(np.nan, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"step_length": 0},
+        {"arrive": -1},
+        {"lost": np.nan},
+        {"heading_noise": -1},
+        {"max_steps": 0},
+        {"patience": np.inf},
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(renderer, route, memory, settings):
+    with pytest.raises(InputError):
+        agent(renderer, route, memory, **settings)
+
+
+def test_a_learning_walk_looks_ahead_from_both_sides():
+    poses = training_poses(STRAIGHT, every=10, learning_walk=0.2).reshape(-1, 1 + 2 * len(SIDES), 3)
+    assert np.array_equal(poses[:, 0], STRAIGHT.poses[::10])
+    assert np.allclose(poses[0, 1:, 1] - 1.5, [0.05, -0.05, 0.1, -0.1, 0.2, -0.2])
+    for x, y, heading in poses[0]:
+        assert np.isclose(y + np.tan(heading) * (0.5 + AHEAD - x), 1.5)  # each looks at the point AHEAD on the route
+    assert np.array_equal(training_poses(STRAIGHT, every=3), STRAIGHT.poses[::3])
+
+
+class Blinking:
+    """A renderer that sees nothing at the poses whose places in the batch are `blind`."""
+
+    backend = "cpu"
+
+    def __init__(self, renderer, blind: slice):
+        self.renderer, self.blind = renderer, blind
+        self.world, self.eye = renderer.world, renderer.eye
+
+    def render(self, poses):
+        views = self.renderer.render(poses)
+        views[self.blind] = 255
+        return views
+
+    def close(self): ...
+
+    def __enter__(self): ...
+
+    def __exit__(self, kind, error, at): ...
+
+
+def test_views_that_show_nothing_are_not_learned(renderer):
+    poses = random_poses(6) * 0.2 + [1.5, 1.5, 0]
+    model = PerfectMemory()
+    kept = learn(model, ENCODING, Blinking(renderer, slice(1, None, 2)), poses)
+    assert np.array_equal(kept, poses[::2])
+    assert len(model.snapshots) == 3
+    with pytest.raises(InputError, match="none of 6 training views shows anything"):
+        learn(model, ENCODING, Blinking(renderer, slice(None)), poses)
+
+
+def test_a_trajectory_is_its_steps(renderer, route, memory, tmp_path):
+    walker = agent(renderer, route, memory, max_steps=5)
+    trajectory = Trajectory()
+    for step in walker.walk(walker.start()):
+        trajectory.add(step)
+    trajectory.write(tmp_path / "t.csv")
+    lines = (tmp_path / "t.csv").read_text().splitlines()
+    assert lines[0] == ",".join(COLUMNS)
+    assert len(lines) == len(trajectory) + 1 == 7
+    assert lines[-1].endswith(OUT_OF_STEPS)
+    assert np.allclose([float(line.split(",")[1]) for line in lines[1:]], trajectory.xy[:, 0])

@@ -1,0 +1,224 @@
+"""The command line as a contract: names, flags, keys, exit codes, and what it leaves behind."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from navigation.cli import main
+from render.eye import Eye
+from render.renderer import open_renderer
+from world.files import read_world
+from world.scene import World
+
+TUSSOCK = str(Path(sys.executable).with_name("tussock"))
+SMALL = ["--world", "tiny", "--size", "180x40", "--seed", "2"]
+
+
+def tussock(capfd, *arguments) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command, run in this process."""
+    capfd.readouterr()
+    code = 0
+    try:
+        main([str(argument) for argument in arguments])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    return code, *capfd.readouterr()
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def test_help_names_every_command(capfd):
+    code, out, _ = tussock(capfd, "--help")
+    assert code == 0
+    assert all(name in out for name in ("world", "view", "evaluate", "run", "play"))
+    for name in ("world", "view", "evaluate", "run", "play"):
+        assert tussock(capfd, name, "--help")[0] == 0
+
+
+def test_help_loads_nothing_heavy():
+    script = (
+        "import sys; from navigation.cli import main\n"
+        "try: main(['run', '--help'])\n"
+        "except SystemExit: print(sorted({'torch', 'numba', 'trimesh', 'rerun', 'matplotlib', 'cv2', 'scipy'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("suffix", ["glb", "ply"])
+def test_world_writes_what_generate_makes(capfd, tmp_path, suffix):
+    out = tmp_path / f"w.{suffix}"
+    code, printed, _ = tussock(
+        capfd, "world", "--preset", "tiny", "--seed", 7, "--out", out, "--picture", tmp_path / "w.png", "--json"
+    )
+    assert code == 0
+    assert json.loads(printed)["triangles"] == len(World.generate("tiny", 7).triangles)
+    assert np.array_equal(read_world(out).triangles, World.generate("tiny", 7).triangles)
+    assert cv2.imread(str(tmp_path / "w.png")) is not None
+
+
+def test_view_writes_what_the_renderer_draws(capfd, tmp_path):
+    code, printed, _ = tussock(
+        capfd, "view", "--world", "tiny", "--seed", 3, "--at", "1,2,90", "--out", tmp_path / "v.png", "--json"
+    )
+    assert code == 0
+    assert json.loads(printed) == {"view": str(tmp_path / "v.png"), "width": 720, "height": 150, "renderer": "cpu"}
+    with open_renderer(World.generate("tiny", 3), Eye(), "cpu") as renderer:
+        view = renderer.render([(1.0, 2.0, np.pi / 2)])[0]
+    assert np.array_equal(cv2.imread(str(tmp_path / "v.png"), cv2.IMREAD_UNCHANGED)[..., ::-1], view[..., :3])
+    tussock(capfd, "view", "--world", "tiny", "--seed", 3, "--at", "1,2,90", "--out", tmp_path / "a.png", "--alpha")
+    assert np.array_equal(cv2.imread(str(tmp_path / "a.png"), cv2.IMREAD_UNCHANGED)[..., 3], view[..., 3])
+
+
+def test_evaluate_prints_one_object(capfd):
+    code, out, err = tussock(
+        capfd, "evaluate", *SMALL, "--model", "perfect-memory", "--encoding", "grey", "--resize", 2, "--every", 2, "--spacing-m", 0.04,
+        "--learning-walk-m", 0, "--grid-m", 0.2, "--within-m", 0.2, "--scan-deg", 360, "--json",
+    )  # fmt: skip
+    assert code == 0
+    result = json.loads(out)
+    assert {"n_views", "n_positions", "median_error_deg", "mean_error_deg", "share_over_45", "seconds"} <= set(result)
+    assert result["encoding"] == "grey | resize 2"
+    assert 0 <= result["median_error_deg"] <= 180
+    assert "renderer: cpu" in err
+
+
+RUN = ["run", *SMALL, "--step-m", 0.05, "--offset-m", 0.1, "--heading-noise-deg", 5]
+
+
+def test_run_arrives_and_leaves_a_whole_folder(capfd, tmp_path):
+    out = tmp_path / "run"
+    code, printed, _ = tussock(capfd, *RUN, "--out", out, "--json")
+    assert code == 0
+    result = json.loads(printed)
+    assert set(result) == {
+        "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "resets", "seconds", "steps_per_second", "recording",
+    }  # fmt: skip
+    assert result["arrived"]
+    assert result["reason"] == "arrived"
+    assert Path(result["recording"]).is_file()
+    assert files(out) == {"recording.rrd", "trajectory.csv", "summary.json", "overview.png", "route.csv"}
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["steps"] == result["steps"] == len((out / "trajectory.csv").read_text().splitlines()) - 2
+    assert summary["settings"]["seed"] == 2
+    assert cv2.imread(str(out / "overview.png")) is not None
+    # A second run is refused and changes nothing; --overwrite replaces it, and the route it left can be walked again.
+    before = {path: path.stat().st_mtime_ns for path in out.iterdir()}
+    code, printed, err = tussock(capfd, *RUN, "--out", out, "--json")
+    assert (code, printed) == (2, "")
+    assert "already holds a run" in err
+    assert before == {path: path.stat().st_mtime_ns for path in out.iterdir()}
+    code, again, _ = tussock(capfd, *RUN, "--out", out, "--overwrite", "--json", "--on-lost", "reset")
+    assert code == 0
+    assert json.loads(again)["steps"] == result["steps"]
+
+
+def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path):
+    for name in ("a", "b"):
+        folder = tmp_path / name
+        folder.mkdir()
+        subprocess.run(
+            [TUSSOCK, "world", "--preset", "tiny", "--seed", "5", "--out", "w.glb"],
+            cwd=folder,
+            check=True,
+            capture_output=True,
+        )
+        run = [TUSSOCK, *map(str, RUN), "--world", "w.glb", "--out", "run", "--json"]
+        subprocess.run(run, cwd=folder, check=True, capture_output=True)
+    for name in ("w.glb", "run/route.csv", "run/trajectory.csv", "run/overview.png"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+    a, b = (json.loads((tmp_path / name / "run" / "summary.json").read_text()) for name in ("a", "b"))
+    for summary in (a, b):
+        del summary["seconds"], summary["steps_per_second"]
+    assert a == b
+
+
+BAD = {
+    "a missing world": (["view", "--world", "nowhere.glb"], r"there is no world file nowhere\.glb"),
+    "a truncated world": (["view", "--world", "cut.glb"], r"cut\.glb cannot be read"),
+    "an odd .bin": (["view", "--world", "odd.bin"], r"odd\.bin has 100 bytes; .* multiple of 96"),
+    "an unknown preset": (["view", "--world", "desert"], "tussock-field"),
+    "an unknown preset to grow": (["world", "--preset", "desert", "--out", "w.glb"], "known: tussock-field"),
+    "a negative seed": (["world", "--preset", "tiny", "--seed", "-1", "--out", "w.glb"], "seed"),
+    "an odd ending": (["world", "--preset", "tiny", "--out", "w.xyz"], r"\.glb or \.ply"),
+    "NaN in a route": (["evaluate", *SMALL, "--route", "nan.csv"], r"nan\.csv, line 3: x_m is 'nan'"),
+    "a route of one point": (["run", *SMALL, "--route", "one.csv", "--out", "r"], "at least 2"),
+    "a route elsewhere": (["run", *SMALL, "--route", "far.csv", "--out", "r"], "leaves the world"),
+    "a pose outside": (["view", "--world", "tiny", "--at", "99,0,0"], "outside the world"),
+    "a pose that is none": (["view", "--world", "tiny", "--at", "1,2"], "X,Y,HEADING_DEG"),
+    "a NaN pose": (["view", "--world", "tiny", "--at", "nan,2,0"], "outside the world"),
+    "size 0": (["view", "--world", "tiny", "--size", "0x0"], "0 x 0 pixels"),
+    "a size that is none": (["run", *SMALL, "--size", "big", "--out", "r"], "columns x rows"),
+    "an unknown model": (["run", *SMALL, "--model", "oracle", "--out", "r"], "visual-compass, perfect-memory, mlp"),
+    "an unknown encoding": (["run", *SMALL, "--encoding", "smell", "--out", "r"], "grey, sky, edges"),
+    "an unknown renderer": (["run", *SMALL, "--renderer", "vulkan", "--out", "r"], "auto, cpu, egl, osmesa"),
+    "a scan of nothing": (["evaluate", *SMALL, "--scan-deg", "0"], "scan"),
+    "no spacing": (["evaluate", *SMALL, "--spacing-m", "0"], "spacing"),
+    "every 0": (["evaluate", *SMALL, "--every", "0"], "every 0"),
+    "a start outside": (["run", *SMALL, "--offset-m", "50", "--out", "r"], "outside the world"),
+    "neither stop nor reset": (["run", *SMALL, "--on-lost", "cry", "--out", "r"], "stop or reset"),
+    "a file for a folder": (["run", *SMALL, "--out", "one.csv"], r"one\.csv is a file"),
+    "a folder under a file": (["run", *SMALL, "--out", "one.csv/run"], "cannot be written"),
+    "no viewer to stream to": (
+        ["run", *SMALL, "--out", "r", "--live", "--viewer", "rerun+http://127.0.0.1:1/proxy"],
+        "no rerun viewer",
+    ),
+    "nothing to play": (["play", "."], "no recording"),
+    "a view as .jpg": (["view", "--world", "tiny", "--at", "1,1,0", "--out", "v.jpg"], r"\.png"),
+    "a view into nowhere": (["view", "--world", "tiny", "--at", "1,1,0", "--out", "no/v.png"], "there is no folder no"),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_input_is_one_line_exit_2_and_leaves_nothing(capfd, tmp_path, monkeypatch, what):
+    arguments, message = BAD[what]
+    monkeypatch.chdir(tmp_path)
+    Path("odd.bin").write_bytes(b"\0" * 100)
+    Path("nan.csv").write_text("x_m,y_m,heading_deg\n1,1,0\nnan,1,0\n2,2,0\n")
+    Path("one.csv").write_text("x_m,y_m,heading_deg\n1,1,0\n")
+    Path("far.csv").write_text("x_m,y_m,heading_deg\n1,1,0\n100,1,0\n")
+    tussock(capfd, "world", "--preset", "tiny", "--out", "cut.glb")
+    Path("cut.glb").write_bytes(Path("cut.glb").read_bytes()[:2000])
+    before = files(tmp_path)
+    code, out, err = tussock(capfd, *arguments)
+    assert code == 2
+    assert out == ""
+    lines = err.splitlines()
+    assert len(lines) == 1, err
+    assert re.search(message, lines[0]), lines
+    assert files(tmp_path) == before
+
+
+def test_a_renderer_that_is_not_there_is_an_error_and_not_another_one():
+    # Without its libraries in sight: the loader finds no EGL in an empty folder of names that are not libraries.
+    script = (
+        "import ctypes.util, ctypes, sys\n"
+        "real = ctypes.CDLL\n"
+        "def missing(name, *a, **k):\n"
+        "    if name and ('EGL' in str(name) or 'OSMesa' in str(name)): raise OSError('cannot open shared object file')\n"
+        "    return real(name, *a, **k)\n"
+        "ctypes.CDLL = missing\n"
+        "ctypes.util.find_library = lambda name: None\n"
+        "from navigation.cli import main\n"
+        "main(['view', '--world', 'tiny', '--at', '1,1,0', '--renderer', sys.argv[1]])"
+    )
+    for backend, package in (("egl", "libegl1"), ("osmesa", "libosmesa6")):
+        done = subprocess.run([sys.executable, "-c", script, backend], capture_output=True, text=True)
+        assert done.returncode == 2, done.stderr
+        assert done.stdout == ""
+        assert package in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+def test_wrong_flags_exit_with_2(capfd):
+    assert tussock(capfd, "run", "--no-such-flag")[0] == 2
+    assert tussock(capfd, "fly")[0] == 2
+    assert tussock(capfd, "world")[0] == 2  # --out is missing

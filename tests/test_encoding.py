@@ -1,0 +1,122 @@
+"""Encodings: laws of the ring, exact values, and their names."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scenes import random_poses, random_world
+
+from navigation.encoding import PRESETS, Encoding
+from render.eye import Eye
+from render.renderer import open_renderer
+from world.errors import InputError
+
+CHAINS = [
+    "grey",
+    "sky-mask",
+    "grey | blur 1.5",
+    "grey | resize 3",
+    "sky-mask | vertical-edges",
+    "grey | normalise",
+    "sky-mask | blur 2 | vertical-edges | resize 3 | normalise",
+]
+
+
+@pytest.fixture(scope="module")
+def views():
+    with open_renderer(random_world(), Eye(width=120, height=30, samples=1, z=0.05), "cpu") as renderer:
+        return renderer.render(random_poses(6))
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+def test_rolling_the_view_rolls_the_features(views, chain):
+    encoding = Encoding.parse(chain)
+    step = 3 if "resize" in chain else 1
+    rolled = encoding(np.roll(views, 5 * step, axis=2)).numpy()
+    assert np.allclose(rolled, np.roll(encoding(views).numpy(), 5, axis=2), atol=1e-5)
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+def test_a_chain_is_its_text(chain):
+    assert str(Encoding.parse(chain)) == chain
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+def test_a_batch_equals_its_views_one_by_one(views, chain):
+    encoding = Encoding.parse(chain)
+    assert np.allclose(encoding(views), np.concatenate([encoding(view[None]) for view in views]), atol=1e-6)
+
+
+def test_grey_is_opencvs_grey(views):
+    theirs = np.stack([cv2.cvtColor(np.ascontiguousarray(view[..., :3]), cv2.COLOR_RGB2GRAY) for view in views])
+    assert np.abs(Encoding.parse("grey")(views).numpy() * 255 - theirs).max() < 1.01
+
+
+def test_sky_mask_is_alpha_and_its_estimate_from_colours_is_close(views):
+    mask = Encoding.parse("sky-mask")
+    exact = mask(views).numpy()
+    assert np.array_equal(exact, views[..., 3] / np.float32(255))
+    estimated = mask(np.ascontiguousarray(views[..., :3])).numpy()
+    assert np.abs(estimated - exact).mean() < 0.05
+
+
+def test_resizing_averages_blocks():
+    image = np.random.default_rng(0).integers(0, 256, (1, 12, 24, 3)).astype(np.uint8)
+    whole = Encoding.parse("grey")(image).numpy()
+    assert np.allclose(
+        Encoding.parse("grey | resize 3")(image), whole.reshape(1, 4, 3, 8, 3).mean(axis=(2, 4)), atol=1e-6
+    )
+    assert Encoding.parse("grey | resize 7")(image).shape == (1, 2, 4)  # rounded, at least four columns
+
+
+def test_edges_are_what_a_loop_finds(views):
+    mask = views[..., 3].astype(float) / 255
+    edges = Encoding.parse("sky-mask | vertical-edges")(views).numpy()
+    for column in range(120):
+        assert np.allclose(edges[..., column], abs(mask[..., (column + 1) % 120] - mask[..., column]), atol=1e-6)
+
+
+def test_normalised_images_have_mean_0_and_variance_1_and_blank_ones_are_0(views):
+    features = Encoding.parse("grey | normalise")(views).numpy()
+    assert np.allclose(features.mean(axis=(1, 2)), 0, atol=1e-5)
+    assert np.allclose(features.std(axis=(1, 2)), 1, atol=1e-4)
+    assert (Encoding.parse("grey | normalise")(np.full((1, 4, 8, 3), 77, np.uint8)).numpy() == 0).all()
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_presets_are_chains(name, views):
+    encoding = Encoding.named(name, resize=3, blur=1)
+    assert Encoding.parse(str(encoding)) == encoding
+    assert encoding(views).shape == (6, 10, 40)
+    assert encoding(views[:0]).shape == (0, 10, 40)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("edge", "unknown encoding 'edge'; known: grey, sky, edges"),
+        ("blur 2 | grey", "cannot start with 'blur'"),
+        ("grey | sharpen", "cannot go on with 'sharpen'; known here: blur, resize"),
+        ("grey | blur", "blur takes 1 number"),
+        ("grey | blur two", "blur takes 1 number"),
+        ("grey | normalise 3", "normalise takes no number"),
+        ("grey | resize 0.5", "factor from 1"),
+        ("grey | blur nan", "standard deviation"),
+        ("grey |", "cannot go on with ''"),
+    ],
+)
+def test_what_spells_no_encoding_is_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        Encoding.named(text)
+
+
+def test_a_chain_takes_no_resize_beside_it():
+    with pytest.raises(InputError, match="instead of beside it"):
+        Encoding.named("grey | resize 3", resize=2)
+
+
+@given(st.integers(1, 12), st.integers(4, 40), st.sampled_from([3, 4]), st.integers(0, 255), st.sampled_from(CHAINS))
+def test_any_view_gives_finite_features(height, width, channels, level, chain):
+    features = Encoding.parse(chain)(np.full((2, height, width, channels), level, np.uint8))
+    assert np.isfinite(features.numpy()).all()

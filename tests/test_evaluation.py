@@ -1,0 +1,92 @@
+"""Heading errors: what they are made of, and what the study found in the Sussex world."""
+
+import numpy as np
+import pytest
+
+from navigation.encoding import Encoding
+from navigation.evaluation import grid_positions, heading_errors, nearest_view
+from navigation.models import PerfectMemory, make_model
+from navigation.training import learn, training_poses
+from render.eye import Eye
+from render.renderer import open_renderer
+from world.errors import InputError
+from world.files import read_route, read_world
+from world.geometry import Bounds, Route, wrap_angle
+from world.scene import World
+from world.walk import generate_route
+
+FIELD = Bounds(0, 0, 10, 10)
+ROUTE = Route.through(np.array([[1.0, 1.0], [2.0, 1.3], [2.5, 2.2]])).resampled(0.05)
+
+
+def test_grid_positions_are_the_multiples_near_the_route():
+    positions = grid_positions(ROUTE, grid=0.2, within=0.25, field=FIELD)
+    assert np.allclose(positions / 0.2, np.round(positions / 0.2))
+    everywhere = np.stack(np.meshgrid(np.arange(51) * 0.2, np.arange(51) * 0.2), axis=-1).reshape(-1, 2)
+    assert len(positions) == (ROUTE.nearest(everywhere)[0] <= 0.25).sum()
+    inside = grid_positions(ROUTE, grid=0.2, within=0.25, field=Bounds(0, 0, 1.5, 10))
+    assert inside[:, 0].max() <= 1.5
+
+
+@pytest.mark.parametrize("settings", [{"grid": 0}, {"grid": np.nan}, {"grid": 1e-6}, {"grid": 5.0, "within": 0.01}])
+def test_grids_without_positions_are_refused(settings):
+    with pytest.raises(InputError):
+        grid_positions(ROUTE, **({"grid": 0.2, "within": 0.2, "field": FIELD} | settings))
+
+
+def test_place_recognition_finds_the_nearest_view():
+    places = np.random.default_rng(0).uniform(0, 4, (30, 2))
+    for place, found in zip(places, nearest_view(ROUTE, places), strict=True):
+        assert found == min(range(len(ROUTE.xy)), key=lambda i: np.hypot(*(ROUTE.xy[i] - place)))
+
+
+@pytest.fixture(scope="module")
+def tiny():
+    with open_renderer(World.generate("tiny", 0), Eye(width=180, height=40, samples=2), "cpu") as renderer:
+        yield renderer, generate_route(renderer.world, 0).resampled(0.05)
+
+
+def test_on_the_route_itself_perfect_memory_makes_no_error(tiny):
+    renderer, route = tiny
+    encoding = Encoding.parse("grey")
+    model = PerfectMemory()
+    learn(model, encoding, renderer, route.poses)
+    found = heading_errors(model, encoding, renderer, route, route.xy)
+    # Views face east, so their columns of 2 degrees lie between those of the learned views: a column either way.
+    assert np.degrees(found.errors).max() <= 4
+    assert found.median_error_deg < 1
+    assert np.array_equal(found.nearest, np.arange(len(route.xy)))
+
+
+def test_errors_are_between_the_recovered_and_the_nearest_views_heading(tiny):
+    renderer, route = tiny
+    encoding = Encoding.parse("grey | resize 3")
+    model = make_model("visual-compass").fit(encoding(renderer.render(route.poses)))
+    positions = grid_positions(route, grid=0.2, within=0.2, field=renderer.world.field)
+    found = heading_errors(model, encoding, renderer, route, positions)
+    assert np.allclose(found.errors, np.abs(wrap_angle(found.headings - route.poses[found.nearest, 2])))
+    degrees = np.degrees(found.errors)
+    assert (found.median_error_deg, found.mean_error_deg) == (np.median(degrees), np.mean(degrees))
+    assert found.share_over_45 == (degrees > 45).mean()
+    narrow = heading_errors(model, encoding, renderer, route, positions, scan=np.radians(90))
+    assert np.degrees(narrow.errors).max() <= 45 + 6
+
+
+@pytest.mark.parametrize("name", ["ant1_route1", "ant4_route1"])
+def test_the_sussex_routes_give_what_the_study_found(sussex, name):
+    world = read_world(sussex / "world5000_gray.bin")
+    route = read_route(sussex / f"{name}.bin").resampled(0.04)
+    positions = grid_positions(route, grid=0.2, within=0.2, field=world.field)
+    with open_renderer(world, backend="cpu") as renderer:
+
+        def errors(encoding: Encoding, every: int):
+            model = PerfectMemory()
+            learn(model, encoding, renderer, training_poses(route, every=every))
+            return heading_errors(model, encoding, renderer, route, positions)
+
+        grey = errors(Encoding.named("grey", resize=6), 6)
+        assert 8 < grey.median_error_deg < 20
+        assert 35 < grey.mean_error_deg < 55
+        edges = errors(Encoding.named("edges", resize=3), 1)
+        assert edges.median_error_deg < 3.5
+        assert edges.mean_error_deg < 14

@@ -1,0 +1,80 @@
+"""The rotation engine against a loop that rolls the view."""
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from navigation import rotation
+from navigation.rotation import FilterBank, best_turn, rotations, scan_window
+from world.errors import InputError
+
+sizes = st.tuples(st.integers(1, 4), st.integers(1, 5), st.integers(1, 6), st.integers(4, 15))
+
+
+@given(sizes, st.integers(0, 1000))
+def test_responses_equal_rolling_and_summing(size, seed):
+    n, m, h, w = size
+    random = torch.Generator().manual_seed(seed)
+    views, filters = torch.randn(n, h, w, generator=random), torch.randn(m, h, w, generator=random)
+    rolled = torch.stack([torch.roll(views, k, dims=-1) for k in range(w)], dim=-1)  # (n, h, w, k)
+    expected = torch.einsum("nhwk,mhw->nmk", rolled, filters)
+    assert torch.allclose(FilterBank(filters).responses(views), expected, atol=1e-4)
+
+
+def test_chunks_change_nothing(monkeypatch):
+    views, bank = torch.randn(3, 4, 12), FilterBank(torch.randn(50, 4, 12))
+    whole = bank.responses(views)
+    monkeypatch.setattr(rotation, "CHUNK_BYTES", 5000)
+    assert len(list(bank.chunks(views))) > 1
+    assert torch.allclose(bank.responses(views), whole, atol=1e-5)
+
+
+def test_rotations_roll():
+    view = torch.randn(3, 8)
+    assert torch.equal(
+        rotations(view, torch.tensor([0, 3, 7])), torch.stack([torch.roll(view, k, dims=1) for k in (0, 3, 7)])
+    )
+
+
+def test_the_best_turn_is_left_for_low_rotations_and_right_for_high_ones():
+    familiarity = np.zeros((2, 36))
+    familiarity[0, 2] = familiarity[1, 34] = 1
+    assert np.allclose(np.degrees(best_turn(familiarity)), [20, -20])
+
+
+def test_interpolation_finds_the_top_of_a_parabola_between_columns():
+    turns = rotation.turn_of_columns(np.arange(36), 36)
+    for top in np.radians([3.0, -41.5, 174.0]):
+        away = rotation.wrap_angle(turns - top)
+        assert np.isclose(best_turn(-(away**2)[None])[0], top, atol=1e-9)
+        assert abs(best_turn(-(away**2)[None], interpolate=False)[0] - top) <= np.radians(5.01)
+
+
+def test_a_flat_scan_goes_straight_on():
+    assert best_turn(np.zeros((1, 36)), scan_window(36, np.pi)) == 0
+
+
+@given(st.integers(4, 200), st.floats(0.01, 2 * np.pi), st.floats(-np.pi, np.pi))
+def test_a_window_holds_the_rotations_within_half_its_angle(width, angle, centre):
+    window = scan_window(width, angle, centre)
+    away = np.abs(rotation.wrap_angle(rotation.turn_of_columns(np.arange(width), width) - centre))
+    assert window.any()
+    assert window[away < angle / 2 - 1e-6].all()
+    assert (away[window] <= max(angle / 2, np.pi / width) + 1e-6).all()
+
+
+@given(st.integers(0, 1000))
+def test_the_chosen_rotation_lies_in_the_window(seed):
+    familiarity = np.random.default_rng(seed).normal(size=(3, 24))
+    windows = np.stack([scan_window(24, np.pi / 2, centre) for centre in (0.0, 2.0, -3.0)])
+    columns = np.round(best_turn(familiarity, windows, interpolate=False) * 24 / (2 * np.pi)).astype(int) % 24
+    assert windows[np.arange(3), columns].all()
+    assert (familiarity[np.arange(3), columns] == np.where(windows, familiarity, -9).max(axis=1)).all()
+
+
+@pytest.mark.parametrize("angle", [0, -1, 7, np.nan])
+def test_a_scan_of_no_angle_is_refused(angle):
+    with pytest.raises(InputError, match="scan"):
+        scan_window(36, angle)
