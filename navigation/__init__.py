@@ -1,0 +1,55 @@
+"""Familiarity models, the agent that follows them, and how well they do.
+
+The names below are loaded when they are first used: some need torch, which takes a second to import.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .agent import Agent, Step
+    from .encoding import Encoding
+    from .evaluation import grid_positions, heading_errors
+    from .familiarity import FamiliarityModel
+    from .models import MLP, PerfectMemory, VisualCompass, make_model
+    from .recording import Recording
+    from .runs import record_walk
+    from .training import learn, training_poses
+    from .trajectory import Trajectory
+
+__all__ = [
+    "MLP",
+    "Agent",
+    "Encoding",
+    "FamiliarityModel",
+    "PerfectMemory",
+    "Recording",
+    "Step",
+    "Trajectory",
+    "VisualCompass",
+    "grid_positions",
+    "heading_errors",
+    "learn",
+    "make_model",
+    "record_walk",
+    "training_poses",
+]
+
+_HOMES = {
+    "agent": ("Agent", "Step"),
+    "encoding": ("Encoding",),
+    "evaluation": ("grid_positions", "heading_errors"),
+    "familiarity": ("FamiliarityModel",),
+    "models": ("MLP", "PerfectMemory", "VisualCompass", "make_model"),
+    "recording": ("Recording",),
+    "runs": ("record_walk",),
+    "training": ("learn", "training_poses"),
+    "trajectory": ("Trajectory",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str):
+    if name in _HOME:
+        return getattr(import_module(f".{_HOME[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,8 +4,14 @@ A recorder consumes steps as they come and streams them to disk, so the loop kno
 recording that opens up to the crash. The blueprint travels inside the file: opening it needs no clicking.
 """
 
+import os
+import shutil
 import socket
-from collections.abc import Sequence
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -13,9 +19,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import Float
+from rerun.experimental import ViewerClient
 
 from render.renderer import Renderer
 from world.errors import InputError
+from world.files import replacing
 from world.geometry import Route, turn_of_columns
 from world.scene import World
 
@@ -111,7 +119,7 @@ class Recording:
         goal = [*route.xy[-1], ABOVE]
         log(
             "world/goal",
-            rr.Points3D([goal], colors=ROUTE_COLOUR, radii=0.06, labels=["goal"], show_labels=True),
+            rr.Points3D([goal], colors=ROUTE_COLOUR, radii=0.06),
             static=True,
         )
         if self._training_poses is not None:
@@ -143,6 +151,62 @@ def check_viewer(url: str) -> None:
         raise InputError(f"no rerun viewer listens at {url}; start one with: rerun --bind 127.0.0.1") from error
 
 
+def screenshot(recording: Path, picture: Path, *, seconds: float = 60.0) -> None:
+    """Save what the viewer shows of a recording, once it shows all of it, as a PNG; needs no display.
+
+    Raises InputError where the viewer cannot draw, or is not done within `seconds`.
+    """
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000", str(recording)]
+    until = time.monotonic() + seconds
+    # The viewer loads and greets in the background and tells nobody when it is done: it is when its picture stays the same.
+    earlier: list[bytes] = []
+    with replacing(picture) as partial, _viewer(options) as viewer:
+        while len(earlier) < 4 or len(set(earlier[-4:])) > 1:
+            if viewer.poll() is not None or time.monotonic() > until:
+                raise InputError("the viewer drew no picture; it needs Vulkan (Debian: mesa-vulkan-drivers libvulkan1)")
+            time.sleep(0.5)
+            try:
+                ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(partial.absolute()))
+                earlier.append(partial.read_bytes())
+            except (ConnectionError, OSError, RuntimeError, ValueError):
+                continue  # not up yet
+
+
+def watch(recording: Path, *, web: bool = False) -> None:
+    """Open a recording in the viewer and wait until it is closed: a window, or a page served to browsers on this machine only."""
+    options = ["--bind", "127.0.0.1", str(recording), *(["--web-viewer"] if web else [])]
+    with _viewer(options) as viewer:
+        if viewer.wait():
+            raise InputError(f"the viewer ended with code {viewer.returncode}; try --web, or --screenshot FILE.png")
+
+
+def viewer_program() -> str:
+    """Path of the viewer. The command `rerun` only starts it, and would leave it running when it is ended itself."""
+    package = find_spec("rerun_cli")
+    folders = list(package.submodule_search_locations or []) if package else []
+    program = shutil.which("rerun", path=os.pathsep.join(folders)) if folders else None
+    if program is None:
+        raise InputError("the rerun viewer is not installed here; install rerun-sdk")
+    return program
+
+
+@contextmanager
+def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
+    """The viewer that came with rerun-sdk, running; ended with the block."""
+    program = viewer_program()
+    quiet = subprocess.DEVNULL if "--headless" in options else None
+    with subprocess.Popen(
+        [program, *options], env=os.environ | {"RERUN_ANALYTICS": "false"}, stdout=quiet, stderr=quiet
+    ) as viewer:
+        try:
+            yield viewer
+        finally:
+            viewer.terminate()
+
+
 def _direction(heading: float, length: float) -> list[float]:
     return [length * np.cos(heading), length * np.sin(heading), 0.0]
 
@@ -153,14 +217,14 @@ def _up(n: int) -> np.ndarray:
 
 
 def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
-    """Where things are shown: the world to the left, what the agent sees and thinks to the right."""
+    """Where things are shown: what the agent sees and thinks to the left, the world to the right."""
     middle = (route.xy.min(axis=0) + route.xy.max(axis=0)) / 2
     reach = max(float(np.ptp(route.xy, axis=0).max()), 1.0)
     so_far = rrb.VisibleTimeRanges(
         timeline=TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
     )
     world = rrb.Spatial3DView(
-        origin="world", name="World, route (blue) and path (red)",
+        origin="world", name="World, route (blue, to the ball) and path (red)",
         overrides={"world/path": so_far},
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
@@ -168,21 +232,32 @@ def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
             look_target=[*middle, 0.0], eye_up=[0.0, 0.0, 1.0],
         ),
     )  # fmt: skip
-    panels: Sequence[rrb.View] = [
+    seen = rrb.Vertical(
         rrb.Spatial2DView(origin="view", name="What the agent sees (ahead is the middle)"),
         rrb.Spatial2DView(origin="recognised", name="The learned view it recognises"),
-        rrb.BarChartView(origin="familiarity", name="Familiarity by degrees to the right"),
+        rrb.BarChartView(
+            origin="familiarity", name="Familiarity by degrees to the right", plot_legend=rrb.PlotLegend(visible=False)
+        ),
         rrb.TimeSeriesView(
-            origin="deviation", name="Deviation from the route (m)", axis_y=rrb.ScalarAxis(range=(0.0, lost))
+            origin="deviation", name="Deviation from the route (m)", axis_y=rrb.ScalarAxis(range=(0.0, lost)),
+            plot_legend=rrb.PlotLegend(visible=False),
         ),
-        rrb.TimeSeriesView(origin="error", name="Heading error (degrees)", axis_y=rrb.ScalarAxis(range=(-90.0, 90.0))),
-        rrb.TextLogView(origin="events", name="Events"),
-    ]
-    about = rrb.TextDocumentView(origin="about", name="About this walk")
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(world, about, row_shares=[4, 1]),
-            rrb.Vertical(*panels, row_shares=[2, 2, 2, 1.5, 1.5, 0.8]), column_shares=[1, 1],
+        rrb.TimeSeriesView(
+            origin="error", name="Heading error (degrees)", axis_y=rrb.ScalarAxis(range=(-90.0, 90.0)),
+            plot_legend=rrb.PlotLegend(visible=False),
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"), collapse_panels=True,
+        row_shares=[1.3, 1.3, 1, 1, 1],
     )  # fmt: skip
+    around = rrb.Vertical(
+        world,
+        rrb.Horizontal(
+            rrb.TextDocumentView(origin="about", name="About this walk"),
+            rrb.TextLogView(origin="events", name="Events"),
+        ),
+        row_shares=[3, 1],
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(seen, around, column_shares=[1, 1]),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"),
+        collapse_panels=True,
+    )

@@ -2,8 +2,6 @@
 
 import json
 import os
-import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -19,7 +17,8 @@ from world.geometry import Pose
 
 from .agent import Agent
 from .plots import overview
-from .recording import Recording, check_viewer
+from .recording import Recording, check_viewer, watch
+from .recording import screenshot as save_screenshot
 from .trajectory import Trajectory
 
 RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
@@ -108,28 +107,12 @@ def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dic
         raise InputError(f"there is no recording {recording}; give the folder of a run")
     if screenshot is not None and screenshot.suffix.lower() != ".png":
         raise InputError(f"{screenshot}: a picture of the viewer is written as .png")
-    viewer = shutil.which("rerun", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
-    if viewer is None:
-        raise InputError("the rerun viewer is not installed here; install rerun-sdk")
-    environment = os.environ | {"RERUN_ANALYTICS": "false"}
-    command = [viewer, "--bind", "127.0.0.1", str(recording)]
     if screenshot is not None:
-        with replacing(screenshot) as partial:
-            options = ["--headless", "--port", "auto", "--window-size", "1600x1000", "--screenshot-to", str(partial)]
-            done = subprocess.run([*command, *options], env=environment, capture_output=True, text=True)
-            if not partial.exists():
-                lines = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-                raise InputError(
-                    f"the viewer drew no picture ({lines}); it needs Vulkan (Debian: mesa-vulkan-drivers libvulkan1)"
-                )
+        save_screenshot(recording, screenshot)
         return {"recording": str(recording), "screenshot": str(screenshot)}
-    if web:
-        command.append("--web-viewer")
-    elif sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not web and sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise InputError("there is no display here; add --web to watch in a browser, or --screenshot FILE.png")
-    done = subprocess.run(command, env=environment)
-    if done.returncode:
-        raise InputError(f"the rerun viewer ended with code {done.returncode}; try --web, or --screenshot FILE.png")
+    watch(recording, web=web)
     return {"recording": str(recording)}
 
 

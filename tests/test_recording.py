@@ -13,7 +13,7 @@ import pytest
 from navigation.agent import Agent
 from navigation.encoding import Encoding
 from navigation.models import PerfectMemory
-from navigation.recording import Recording
+from navigation.recording import Recording, viewer_program
 from navigation.runs import play
 from navigation.training import learn, training_poses
 from render.eye import Eye
@@ -22,7 +22,7 @@ from world.errors import InputError
 from world.scene import World
 from world.walk import generate_route
 
-RERUN = str(Path(sys.executable).with_name("rerun"))
+RERUN = viewer_program()
 
 
 def rerun(*arguments: str | Path) -> str:
@@ -82,7 +82,7 @@ def test_a_recording_opens_in_the_viewer(walk, recorded, tmp_path):
         raise
     picture = cv2.imread(str(tmp_path / "viewer.png"))
     height, width = picture.shape[:2]
-    views = picture[height // 25 : height // 3, width // 2 :]
+    views = picture[height // 25 : height // 3, : width // 2]
     sky = np.array(walk[0].renderer.world.sky_rgb)[::-1]
     assert (np.abs(views.astype(int) - sky).max(axis=-1) <= 2).mean() > 0.05  # the panoramas are shown
     assert [path.name for path in tmp_path.iterdir()] == ["viewer.png"]
@@ -96,7 +96,7 @@ sys.path.insert(0, {str(Path(__file__).parent)!r})
 from navigation.agent import Agent
 from navigation.encoding import Encoding
 from navigation.models import PerfectMemory
-from navigation.recording import Recording
+from navigation.recording import Recording, viewer_program
 from render import Eye, open_renderer
 from world import World
 from world.walk import generate_route
@@ -122,6 +122,18 @@ for step in agent.walk(agent.start()):
     assert "/view" in printed
 
 
+def wait_until(true, seconds: float = 20) -> None:
+    until = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < until
+        time.sleep(0.1)
+
+
+def listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 def test_a_live_walk_reaches_a_running_viewer(walk, tmp_path):
     agent, _ = walk
     with socket.socket() as free:
@@ -131,28 +143,17 @@ def test_a_live_walk_reaches_a_running_viewer(walk, tmp_path):
     with pytest.raises(InputError, match="no rerun viewer listens"):
         Recording(tmp_path / "a.rrd", agent.renderer.world, agent.route, live=url)
     received = tmp_path / "received.rrd"
-    viewer = subprocess.Popen(
-        [RERUN, "--bind", "127.0.0.1", "--port", str(port), "--save", str(received)],
-        stderr=subprocess.DEVNULL,
-        env={"RERUN_ANALYTICS": "false"},
-    )
-    try:
-        for _ in range(100):
-            try:
-                socket.create_connection(("127.0.0.1", port), timeout=1).close()
-                break
-            except OSError:
-                time.sleep(0.1)
-        with Recording(tmp_path / "b.rrd", agent.renderer.world, agent.route, live=url) as recording:
-            for step in agent.walk(agent.start()):
-                recording.log(step)
-        for _ in range(100):
-            if received.exists() and received.stat().st_size > 0.5 * (tmp_path / "b.rrd").stat().st_size:
-                break
-            time.sleep(0.1)
-    finally:
-        viewer.terminate()
-        viewer.wait()
+    command = [RERUN, "--bind", "127.0.0.1", "--port", str(port), "--save", str(received)]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env={"RERUN_ANALYTICS": "false"}) as viewer:
+        try:
+            wait_until(lambda: listens(port))
+            with Recording(tmp_path / "b.rrd", agent.renderer.world, agent.route, live=url) as recording:
+                for step in agent.walk(agent.start()):
+                    recording.log(step)
+            size = (tmp_path / "b.rrd").stat().st_size
+            wait_until(lambda: received.exists() and received.stat().st_size > 0.5 * size)
+        finally:
+            viewer.terminate()
     assert "/world/path" in rerun("rrd", "print", "-v", received)
 
 
