@@ -33,6 +33,7 @@ VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
 TIMELINE = "step"
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
+FLUSH_SECONDS = 0.5  # what a crash may lose of a recording
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
 
 
@@ -58,6 +59,7 @@ class Recording:
             sinks.append(rr.GrpcSink(live))
         self._stream.set_sinks(*sinks, default_blueprint=blueprint)
         self._log_surroundings(world, route, title)
+        self._flush()
 
     def log(self, step: Step) -> None:
         """Add one step."""
@@ -92,11 +94,18 @@ class Recording:
             level = rr.TextLogLevel.INFO if step.reason == "arrived" else rr.TextLogLevel.WARN
             stream.log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
         self._previous = step
+        if time.monotonic() - self._flushed > FLUSH_SECONDS:
+            self._flush()
 
     def close(self) -> None:
         """Write what is left and close the file."""
-        self._stream.flush()
+        self._flush()
         self._stream.disconnect()
+
+    def _flush(self) -> None:
+        """Bring what was logged to disk; rerun by itself holds small things back until there are megabytes of them."""
+        self._stream.flush()
+        self._flushed = time.monotonic()
 
     def __enter__(self) -> "Recording":
         return self
