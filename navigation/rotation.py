@@ -18,7 +18,7 @@ from jaxtyping import Bool, Complex64, Float, Float32
 from world.errors import InputError
 from world.geometry import turn_of_columns, wrap_angle
 
-CHUNK_BYTES = 256 * 2**20  # bound on the responses held at once
+CHUNK_BYTES = 16 * 2**20  # bound on the responses held at once; more is slower, as memory then is fresh each time
 
 
 class FilterBank:

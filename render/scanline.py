@@ -229,6 +229,7 @@ class ScanlineRenderer:
         self._row_table = _row_table(self._tangents)
         weights = np.cos(elevations).reshape(eye.height, rays)
         self._weights = weights / weights.sum(axis=1, keepdims=True) / rays
+        self._scratch: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # not in use at the moment
         self._threads = threads or len(os.sched_getaffinity(0))
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(self._threads)
 
@@ -255,17 +256,23 @@ class ScanlineRenderer:
     def _render_strip(self, poses: Float[np.ndarray, "n 3"], views: np.ndarray, start: int, stop: int) -> None:
         """Draw columns start..stop-1 of the views at poses."""
         eye, rays = self.eye, self.eye.rays
-        shape = (eye.width * rays, eye.height * rays)
-        nearness, seen = np.empty(shape), np.empty(shape, dtype=np.int32)
-        columns = np.empty(self._x.shape)
+        scratch = self._scratch.pop() if self._scratch else self._new_scratch()
+        columns, nearness, seen = scratch
         for (x, y, heading), view in zip(poses, views, strict=True):
             azimuths = heading + self._azimuths
-            _columns_of(self._x.ravel(), self._y.ravel(), x, y, heading, shape[0], columns.ravel())
+            _columns_of(self._x.ravel(), self._y.ravel(), x, y, heading, eye.width * rays, columns.ravel())
             _draw(
-                self._triangles, columns, not self.world.double_sided, np.array([x, y, eye.z]), np.cos(azimuths), np.sin(azimuths),
-                self._tangents, self._row_table, start * rays, stop * rays, nearness, seen,
+                self._triangles, columns, not self.world.double_sided, np.array([x, y, eye.z]),
+                np.cos(azimuths), np.sin(azimuths), self._tangents, self._row_table,
+                start * rays, stop * rays, nearness, seen,
             )  # fmt: skip
             _average(seen, self._rgba, rays, self._weights, start, stop, view)
+        self._scratch.append(scratch)
+
+    def _new_scratch(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Memory for one thread to draw with; it is kept, because fresh memory costs more than drawing a small view."""
+        shape = (self.eye.width * self.eye.rays, self.eye.height * self.eye.rays)
+        return np.empty(self._x.shape), np.empty(shape), np.empty(shape, dtype=np.int32)
 
     def close(self) -> None:
         """Stop the threads."""
