@@ -87,10 +87,10 @@ def difference(a, b) -> np.ndarray:
     return np.abs(a.astype(int) - b).max(axis=-1)
 
 
-def assert_agree(views, exact):
-    """Under 1 % of the pixels (the promise is 2) differ visibly, and nothing does on the whole."""
+def assert_agree(views, exact, share=0.01):
+    """Few pixels differ visibly (the promise is under 2 %), and nothing does on the whole."""
     assert views.shape == exact.shape
-    assert (difference(views, exact) > 8).mean() < 0.01
+    assert (difference(views, exact) > 8).mean() < share
     assert np.abs(views.mean(axis=(0, 1, 2)) - exact.mean(axis=(0, 1, 2))).max() < 0.5
 
 
@@ -111,14 +111,23 @@ def test_agrees_in_the_sussex_world(backend, sussex):
         assert_agree(ours.render(poses), cpu.render(poses))
 
 
+@pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub"])
+def test_agrees_in_generated_worlds(backend, preset):
+    """Full of leaves smaller than a pixel, which a cube's pixels, looking a little aside, see or do not."""
+    poses = np.array([(5, 5, 0.0), (2.5, 7.5, -1.0), (8, 3, 2.0)])
+    world = World.generate(preset, seed=1)
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
+        assert_agree(ours.render(poses), cpu.render(poses), share=0.02)
+
+
 def test_culled_sussex_frames(backend, sussex):
-    """The frames were drawn by an independent renderer, itself 0.35 to 1.4 grey levels from exact."""
+    """The frames were drawn by an independent renderer, itself 0.35 to 1.4 grey levels from exact; twice a cube's error at most."""
     world = replace(sussex, double_sided=False)
     for entry in json.loads((SUSSEX / "frames" / "poses.json").read_text())["views"]:
         frame = cv2.imread(str(SUSSEX / "frames" / entry["file"]))[..., ::-1]
         with open_renderer(world, Eye(z=entry["z_m"]), backend) as ours:
             view = ours.render([Pose(entry["x_m"], entry["y_m"], np.radians(entry["heading_deg"]))])[0]
-        assert np.abs(view[..., :3].astype(int) - frame).mean() < 1.4
+        assert np.abs(view[..., :3].astype(int) - frame).mean() < 2.6
 
 
 def test_low_resolution_is_averaged(backend, sussex):
@@ -258,7 +267,7 @@ def test_cube_faces_follow_the_eye():
     names = [face.name for face in Cubemap(Eye(), 64).faces]
     assert names == ["ahead", "left", "behind", "right", "above"]
     assert [face.name for face in Cubemap(Eye(top=0.1, bottom=-1.5), 64).faces][-1] == "below"
-    assert face_size_for(Eye()) == 512
+    assert face_size_for(Eye()) == 1152
 
 
 @pytest.mark.parametrize("name", BACKENDS)
