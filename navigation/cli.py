@@ -13,10 +13,10 @@ import tyro
 
 from world.errors import InputError
 
+from .options import Learning, Sight
+from .terminal import progress, say, show
+
 NOT_SETTINGS = ("out", "overwrite", "live", "viewer", "json")  # flags of a run that do not change what happens in it
-WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
-)
 
 
 @dataclass
@@ -50,59 +50,6 @@ class WorldCommand:
 
             overview(world, self.picture, title=f"{self.preset}, seed {self.seed}")
         return {"world": str(self.out), "preset": self.preset, "seed": self.seed, "triangles": len(world.triangles)}
-
-
-@dataclass
-class Sight:
-    """What world is seen, through what eye."""
-
-    world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
-    seed: int = 0
-    """Seed of everything random: the world and route where they are generated, the model's start, the heading noise."""
-    size: str = "720x150"
-    """Columns x rows of a panorama. A pixel wider than a degree is averaged from several rays."""
-    renderer: str = "auto"
-    """auto (the fastest here), cpu, egl or osmesa."""
-    samples: int | None = None
-    """Rays along each side of a pixel. Default: 1 where a pixel is at most a degree wide, else 4."""
-    eye_height_m: float = 0.01
-    """Height of the eye above z = 0."""
-    top_deg: float = 60.0
-    """Elevation of a panorama's upper edge."""
-    bottom_deg: float = -15.0
-    """Elevation of its lower edge."""
-    cull_back_faces: bool = False
-    """See triangles only from their front, as the original Sussex renderer did."""
-
-    def open_world(self):
-        from world import World
-        from world.files import read_world
-        from world.generate import PRESETS
-
-        if self.world in PRESETS:
-            world = World.generate(self.world, self.seed)
-        elif not Path(self.world).suffix and not Path(self.world).exists():
-            raise InputError(f"unknown world {self.world!r}; give one of {', '.join(PRESETS)}, or a file")
-        else:
-            world = read_world(self.world)
-        return dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
-
-    def width_and_height(self) -> tuple[int, int]:
-        """Columns and rows of a panorama."""
-        width, cross, height = self.size.lower().partition("x")
-        if not (cross and width.isdecimal() and height.isdecimal()):
-            raise InputError(f"size {self.size!r}: give columns x rows, for example 720x150")
-        return int(width), int(height)
-
-    def open_renderer(self, world):
-        from render import Eye, open_renderer
-
-        width, height = self.width_and_height()
-        eye = Eye(
-            width=width, height=height, top=math.radians(self.top_deg), bottom=math.radians(self.bottom_deg),
-            z=self.eye_height_m, samples=self.samples,
-        )  # fmt: skip
-        return open_renderer(world, eye, self.renderer)
 
 
 @dataclass
@@ -151,61 +98,6 @@ class ViewCommand(Sight):
         if not (math.isfinite(heading_deg) and field.contains(x, y)):
             raise InputError(f"--at {self.at}: that is outside the world ({field}); choose a place inside")
         return x, y, heading_deg
-
-
-@dataclass
-class Learning(Sight):
-    """What is learned, and from which views."""
-
-    route: Path | None = None
-    """A route file (.csv or AntWorld .bin); without it a route of about 8 m is generated."""
-    model: str = "perfect-memory"
-    """visual-compass, perfect-memory or mlp."""
-    encoding: str = "edges"
-    """edges, grey or sky; or a chain of steps, such as 'sky-mask | vertical-edges | resize 6 | normalise'."""
-    resize: float | None = None
-    """Factor by which a view's width and height are reduced. Default: whatever brings the width down to 120."""
-    blur: float = 0.0
-    """Standard deviation (pixels of the view) of Gaussian smoothing before all else; 0 is none."""
-    spacing_m: float = 0.04
-    """Distance between route views."""
-    every: int = 1
-    """Learn one route view in so many."""
-    learning_walk_m: float = 0.0
-    """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
-
-    def prepare(self):
-        """The world, the route (resampled), the encoding and the untrained model: everything that can be refused early."""
-        from world.files import read_route
-        from world.walk import generate_route
-
-        from .encoding import Encoding
-        from .models import make_model
-
-        model = make_model(self.model, self.seed)
-        automatic = 1.0 if "|" in self.encoding else max(1.0, self.width_and_height()[0] / 120)
-        encoding = Encoding.named(
-            self.encoding, resize=automatic if self.resize is None else self.resize, blur=self.blur
-        )
-        route = read_route(self.route) if self.route else None
-        world = self.open_world()
-        route = (route or generate_route(world, self.seed)).resampled(self.spacing_m)
-        inside = world.field.contains(*route.xy.T)
-        if not inside.all():
-            x, y = route.xy[~inside][0]
-            raise InputError(
-                f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
-            )
-        return world, route, encoding, model
-
-    def learn(self, model, encoding, renderer, route):
-        """Train the model; return the poses whose views it learned."""
-        from .training import learn, training_poses
-
-        poses = training_poses(route, every=self.every, learning_walk=self.learning_walk_m, field=renderer.world.field)
-        say(f"renderer: {renderer.backend}")
-        with progress("learning", "views") as report:
-            return learn(model, encoding, renderer, poses, report)
 
 
 @dataclass
@@ -341,42 +233,6 @@ def check_scan_deg(scan_deg: float) -> None:
     """Refuse a scan that is no angle. Raises InputError."""
     if not 0 < scan_deg <= 360:
         raise InputError(f"--scan-deg {scan_deg:g}: give over 0 and up to 360")
-
-
-def say(text: str) -> None:
-    """Tell the person something that is not the result."""
-    print(text, file=sys.stderr)
-
-
-def progress(what: str, unit: str):
-    """A context that shows progress on standard error; it gives a function report(done, total)."""
-    from contextlib import contextmanager
-
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    @contextmanager
-    def shown():
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn(unit),
-            TimeRemainingColumn(),
-        )
-        console = Console(stderr=True)
-        with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-            task = bar.add_task(what, total=None)
-            yield lambda done, total: bar.update(task, completed=done, total=total)
-
-    return shown()
-
-
-def show(result: dict[str, Any]) -> None:
-    """Print a result for people: a line a value."""
-    width = max(map(len, result))
-    for key, value in result.items():
-        print(f"{key:<{width}}  {f'{value:.4g}' if isinstance(value, float) else value}")
 
 
 def main(arguments: list[str] | None = None) -> None:

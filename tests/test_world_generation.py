@@ -12,8 +12,9 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from world.errors import InputError
-from world.generate import PRESETS, WorldParams, generate_world, plant_positions
+from world.generate import generate_world, plant_positions
 from world.geometry import Bounds, wrap_angle
+from world.params import PRESETS, WorldParams
 from world.scene import Ground, World
 from world.walk import clearance, generate_route
 
@@ -51,7 +52,7 @@ def test_other_seeds_give_other_worlds():
 
 def test_another_process_grows_the_same_world_and_route():
     code = (
-        "from world.generate import *; from world.walk import *; import hashlib\n"
+        "from world.generate import *; from world.params import *; from world.walk import *; import hashlib\n"
         "w = generate_world(PRESETS['tiny'], 5)\n"
         "data = w.triangles.tobytes() + w.rgb.tobytes() + generate_route(w, 2).poses.tobytes()\n"
         "print(hashlib.sha256(data).hexdigest())"
@@ -165,7 +166,7 @@ def test_bad_parameters_are_named(name, value):
 def test_values_of_a_wrong_type_are_named_too():
     """In a process of its own: here the type checker would speak first."""
     code = (
-        "from world.generate import WorldParams\n"
+        "from world.params import WorldParams\n"
         "for name, value in {'bush_height': 'tall', 'trees': 2.5, 'ground_rgb': [1, 2], 'haze': None}.items():\n"
         "    try: WorldParams.from_dict({name: value})\n"
         "    except ValueError as error: assert str(error).startswith(f'{name} is '), error\n"

@@ -11,7 +11,7 @@ from .errors import InputError
 from .geometry import Bounds
 
 if TYPE_CHECKING:
-    from .generate import WorldParams
+    from .params import WorldParams
 
 RGB = tuple[int, int, int]
 
@@ -58,7 +58,8 @@ class World:
 
         Raises InputError for an unknown preset (lists the known) or a seed that is no whole number from 0.
         """
-        from .generate import PRESETS, generate_world
+        from .generate import generate_world
+        from .params import PRESETS
 
         if isinstance(params, str):
             if params not in PRESETS:
