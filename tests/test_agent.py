@@ -144,7 +144,6 @@ def test_a_lost_agent_is_put_back_after_the_furthest_waypoint_and_gets_home(rend
     assert steps[-1].reason == ARRIVED
     resets = [(before, after) for before, after in pairwise(steps) if after.reset]
     assert len(resets) >= 3
-    furthest = 0.0
     for before, after in resets:
         assert after.reset == LOST
         assert before.deviation > 0.1
@@ -152,9 +151,19 @@ def test_a_lost_agent_is_put_back_after_the_furthest_waypoint_and_gets_home(rend
         assert np.isclose(after.pose.heading, 0)
         waypoint = after.along / 0.1
         assert np.isclose(waypoint, round(waypoint))
-        assert after.along > furthest
-        furthest = after.along
+        reached = max(step.along for step in steps[: after.index])
+        assert reached < after.along <= reached + 0.1 + 1e-9
     assert not any(step.reason for step in steps[:-1])
+
+
+def test_a_route_that_ends_where_it_starts_is_walked_around(renderer):
+    angle = np.linspace(0, 2 * np.pi, 64)
+    ring = Route.through(1.5 + 0.6 * np.column_stack([np.cos(angle), np.sin(angle)]))
+    # Steps of 6 cm and turns of 6 degrees to the left go around a circle of 0.57 m.
+    walker = agent(renderer, ring, Turner(2), scan=2 * np.pi, step_length=0.06, lost=9)
+    steps = list(walker.walk(walker.start()))
+    assert steps[-1].reason == ARRIVED
+    assert 50 < len(steps) < 66
 
 
 def test_a_scan_about_a_fixed_direction_keeps_to_it(renderer, route, memory):

@@ -111,6 +111,14 @@ def test_agrees_in_the_sussex_world(backend, sussex):
         assert_agree(ours.render(poses), cpu.render(poses))
 
 
+def test_tall_pixels_are_averaged_by_solid_angle(backend, garden):
+    """A row of 40 degrees up to 80: its upper rays stand for a fifth of what its lower ones do."""
+    eye = Eye(width=16, height=4, top=np.radians(80), bottom=np.radians(-80), samples=24)
+    with open_renderer(garden, eye, backend) as ours, open_renderer(garden, eye, "cpu") as cpu:
+        views, exact = ours.render([HERE]), cpu.render([HERE])
+    assert difference(views, exact).max() < 3
+
+
 @pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub"])
 def test_agrees_in_generated_worlds(backend, preset):
     """Full of leaves smaller than a pixel, which a cube's pixels, looking a little aside, see or do not."""

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import TypeCheckError
 
+from navigation import rotation
 from navigation.familiarity import FamiliarityModel, SnapshotModel
 from navigation.models import MLP, MODELS, PerfectMemory, VisualCompass, make_model
 from world.errors import InputError
@@ -125,6 +126,16 @@ def test_snapshot_models_say_what_they_recognised():
     learned = views(7)
     _, match = model.fit(learned).match(learned)
     assert match[:, 0].tolist() == list(range(7))
+
+
+def test_many_snapshots_are_matched_in_chunks(monkeypatch):
+    model, learned = PerfectMemory().fit(views(30)), views(30)
+    scan, match = model.match(learned)
+    monkeypatch.setattr(rotation, "CHUNK_BYTES", 4 * 8 * 24 * 30)  # four snapshots at once
+    chunked_scan, chunked_match = model.match(learned)
+    assert torch.allclose(chunked_scan, scan, atol=1e-4)
+    assert torch.equal(chunked_match, match)
+    assert match[:, 0].tolist() == list(range(30))
 
 
 def test_the_compass_keeps_the_last_view():
