@@ -74,7 +74,7 @@ def naive_scan(view: np.ndarray, snapshots: np.ndarray) -> np.ndarray:
 
 def walking(table: Table, world: World) -> None:
     """Steps a second of the whole loop, with and without recording."""
-    route = generate_route(world, 1).resampled(0.04)
+    route = generate_route(world, 1)
     for width, height, resize, reach in ((720, 150, 6, 0.2), (120, 25, 1, 0.0)):
         encoding = Encoding.named("edges", resize=resize)
         with (
@@ -82,7 +82,7 @@ def walking(table: Table, world: World) -> None:
             tempfile.TemporaryDirectory() as folder,
         ):
             memory = PerfectMemory()
-            poses = learn(memory, encoding, renderer, training_poses(route, learning_walk=reach))
+            poses = learn(memory, encoding, renderer, training_poses(route.resampled(0.04), learning_walk=reach))
             agent = Agent(
                 renderer=renderer, encoding=encoding, model=memory, route=route, max_steps=100, lost=9.0, patience=99.0
             )

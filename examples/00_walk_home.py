@@ -6,11 +6,11 @@ from world import World
 from world.walk import generate_route
 
 world = World.generate("tussock-field", seed=7)
-route = generate_route(world, seed=7).resampled(0.04)
+route = generate_route(world, seed=7)
 encoding = Encoding.named("edges", resize=6)
 with open_renderer(world) as renderer:
     memory = PerfectMemory()
-    learn(memory, encoding, renderer, training_poses(route, learning_walk=0.2))
+    learn(memory, encoding, renderer, training_poses(route.resampled(0.04), learning_walk=0.2))
     agent = Agent(renderer=renderer, encoding=encoding, model=memory, route=route)
     for step in agent.walk(agent.start(offset=0.1)):
         print(f"step {step.index}: {step.deviation:.3f} m off the route {step.reason or ''}")

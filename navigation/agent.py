@@ -55,11 +55,13 @@ class Agent:
 
     step_length (m). scan: width of the scan (rad), about the present heading, or about the world direction `scan_about` (rad).
     heading_noise: standard deviation of the normal noise on every turn (rad).
-    arrive: the walk is done within this distance of the route's end (m), once half of the route's length has been walked.
+    arrive: the walk is done within this distance of the route's end (m); where the route ends as near to its start, once the
+    agent has been farther away.
     lost: farther than this from the route is lost (m). patience: metres walked without getting farther along the route before
-    the agent counts as stuck. max_steps: None takes what walks the route three times.
+    the agent counts as stuck. max_steps: None takes as many as walk the route's length three times.
     reset_when_lost: instead of ending the walk, put a lost, stuck or straying agent back on the route at the waypoint after the
     furthest one reached, facing along it, as Ardin et al. (2016) count errors.
+    How far along the route the agent is, is where the route is nearest: a route that crosses itself can be cut short there.
     """
 
     renderer: Renderer
@@ -85,6 +87,11 @@ class Agent:
                 raise InputError(f"{name.replace('_', ' ')} {value} m; give a finite distance over 0")
         if not (np.isfinite(self.heading_noise) and self.heading_noise >= 0):
             raise InputError(f"heading noise {np.degrees(self.heading_noise):g} degrees; give 0 or more")
+        scan_window(4, self.scan)  # refuses what is no angle
+        if self.scan_about is not None and not np.isfinite(self.scan_about):
+            raise InputError(
+                f"a scan about {self.scan_about}; give a finite direction, or None for the present heading"
+            )
         if self.max_steps is not None and self.max_steps < 1:
             raise InputError(f"at most {self.max_steps} steps; give at least 1")
 
@@ -104,6 +111,7 @@ class Agent:
         self._check_inside(start)
         random = np.random.default_rng(self.seed)
         pose, reset, furthest, gained_at = start, None, -np.inf, 0
+        been_away = self._from_goal(self.route.start) > self.arrive  # else the route ends where it starts
         for index in range(self.step_limit + 1):
             view = self.renderer.render([pose])[0]
             familiarity, match = self._scan(view, pose)
@@ -112,8 +120,9 @@ class Agent:
             (deviation,), (along,) = self.route.nearest(np.array([pose[:2]]))
             if along > furthest:
                 furthest, gained_at = float(along), index
-            reason = self._reason(index, pose, deviation, index - gained_at)
-            recovering = reason in (LOST, STUCK, OUT_OF_WORLD) and self.reset_when_lost
+            been_away = been_away or self._from_goal(pose) > self.arrive
+            reason = self._reason(index, pose, deviation, index - gained_at, been_away)
+            recovering = self.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < self.step_limit
             yield Step(
                 index=index, pose=pose, view=view, familiarity=familiarity, turn=turn,
                 match=None if match is None else int(match[round(match_turn / (2 * np.pi) * len(match)) % len(match)]),
@@ -133,18 +142,20 @@ class Agent:
         features = self.encoding(view[None])
         if isinstance(self.model, SnapshotModel):
             familiarity, match = self.model.match(features)
-            return familiarity[0].numpy(), match[0].numpy()
-        return self.model.scan(features)[0].numpy(), None
+            return familiarity[0].cpu().numpy(), match[0].cpu().numpy()
+        return self.model.scan(features)[0].cpu().numpy(), None
 
     def _window(self, width: int, pose: Pose) -> np.ndarray:
         centre = 0.0 if self.scan_about is None else float(wrap_angle(self.scan_about - pose.heading))
         return scan_window(width, self.scan, centre)
 
-    def _reason(self, index: int, pose: Pose, deviation: float, steps_without_gain: int) -> str | None:
+    def _from_goal(self, pose: Pose) -> float:
+        """Distance from the route's end (m)."""
+        return float(np.hypot(pose.x - self.route.goal.x, pose.y - self.route.goal.y))
+
+    def _reason(self, index: int, pose: Pose, deviation: float, steps_without_gain: int, been_away: bool) -> str | None:
         """Why the walk ends here, or None."""
-        goal = self.route.goal
-        walked = index * self.step_length
-        if np.hypot(pose.x - goal.x, pose.y - goal.y) <= self.arrive and walked >= 0.5 * self.route.length:
+        if been_away and self._from_goal(pose) <= self.arrive:
             return ARRIVED
         if not self.renderer.world.field.contains(pose.x, pose.y):
             return OUT_OF_WORLD

@@ -4,7 +4,10 @@ import dataclasses
 import json
 import math
 import os
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +16,7 @@ import tyro
 
 from world.errors import InputError
 
-from .options import Learning, Sight
+from .options import LearningOptions, SightOptions
 from .terminal import progress, say, show
 
 NOT_SETTINGS = ("out", "overwrite", "live", "viewer", "json")  # flags of a run that do not change what happens in it
@@ -53,7 +56,7 @@ class WorldCommand:
 
 
 @dataclass
-class ViewCommand(Sight):
+class ViewCommand(SightOptions):
     """Draw the panorama seen at a pose."""
 
     at: Annotated[str | None, tyro.conf.arg(metavar="X,Y,HEADING_DEG")] = None
@@ -101,7 +104,7 @@ class ViewCommand(Sight):
 
 
 @dataclass
-class EvaluateCommand(Learning):
+class EvaluateCommand(LearningOptions):
     """Learn a route, then recover the heading at every grid position beside it."""
 
     grid_m: float = 0.2
@@ -119,24 +122,26 @@ class EvaluateCommand(Learning):
         from .evaluation import grid_positions, heading_errors
 
         began = time.perf_counter()
-        check_scan_deg(self.scan_deg)
-        world, route, encoding, model = self.prepare()
-        positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
-        with self.open_renderer(world) as renderer:
-            poses = self.learn(model, encoding, renderer, route)
+        if not 0 < self.scan_deg <= 360:
+            raise InputError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
+        lesson = self.prepare()
+        positions = grid_positions(lesson.route, grid=self.grid_m, within=self.within_m, field=lesson.world.field)
+        with self.open_renderer(lesson.world) as renderer:
+            learned = lesson.teach(renderer)
             with progress("recovering headings", "positions") as report:
                 found = heading_errors(
-                    model, encoding, renderer, route, positions, scan=math.radians(self.scan_deg), progress=report
-                )
+                    lesson.model, lesson.encoding, renderer, lesson.route_views, positions,
+                    scan=math.radians(self.scan_deg), progress=report,
+                )  # fmt: skip
         return {
-            "model": self.model, "encoding": str(encoding), "n_views": len(poses), "n_positions": len(positions),
+            "model": self.model, "encoding": str(lesson.encoding), "n_views": len(learned), "n_positions": len(positions),
             "median_error_deg": found.median_error_deg, "mean_error_deg": found.mean_error_deg,
             "share_over_45": found.share_over_45, "seconds": time.perf_counter() - began,
         }  # fmt: skip
 
 
 @dataclass
-class RunCommand(Learning):
+class RunCommand(LearningOptions):
     """Learn a route and walk it home, recorded."""
 
     learning_walk_m: float = 0.2
@@ -174,31 +179,32 @@ class RunCommand(Learning):
 
     def run(self) -> dict[str, Any]:
         from .agent import Agent
-        from .runs import check_free, claim, record_walk
+        from .runs import check_run_folder, record_walk
 
         viewer = self.viewer if self.live else None
-        check_free(self.out, overwrite=self.overwrite, viewer=viewer)
-        check_scan_deg(self.scan_deg)
+        inputs = [Path(name) for name in (self.world, self.route) if name is not None]
+        check_run_folder(self.out, overwrite=self.overwrite, inputs=inputs, viewer=viewer)
         if self.on_lost not in ("stop", "reset"):
             raise InputError(f"--on-lost {self.on_lost!r}: give stop or reset")
-        world, route, encoding, model = self.prepare()
-        with self.open_renderer(world) as renderer:
+        lesson = self.prepare()
+        with self.open_renderer(lesson.world) as renderer:
             agent = Agent(
-                renderer=renderer, encoding=encoding, model=model, route=route, step_length=self.step_m,
-                scan=math.radians(self.scan_deg),
+                renderer=renderer, encoding=lesson.encoding, model=lesson.model, route=lesson.route,
+                step_length=self.step_m, scan=math.radians(self.scan_deg),
                 scan_about=None if self.scan_about_deg is None else math.radians(self.scan_about_deg),
                 heading_noise=math.radians(self.heading_noise_deg), arrive=self.arrive_m, lost=self.lost_m,
-                patience=self.patience_m, max_steps=self.max_steps, reset_when_lost=self.on_lost == "reset", seed=self.seed,
+                patience=self.patience_m, max_steps=self.max_steps, reset_when_lost=self.on_lost == "reset",
+                seed=self.seed,
             )  # fmt: skip
             start = agent.start(self.offset_m)
-            claim(self.out)
-            poses = self.learn(model, encoding, renderer, route)
+            learned = lesson.teach(renderer)
             settings = {key: value for key, value in dataclasses.asdict(self).items() if key not in NOT_SETTINGS}
-            settings |= {"encoding": str(encoding), "renderer": renderer.backend, "n_views": len(poses)}
+            settings |= {"encoding": str(lesson.encoding), "renderer": renderer.backend, "n_views": len(learned)}
             with progress("walking", "steps") as report:
                 return record_walk(
-                    agent, start, self.out, training_poses=poses, settings=settings, viewer=viewer, progress=report
-                )
+                    agent, start, self.out, overwrite=self.overwrite, training_poses=learned, settings=settings,
+                    viewer=viewer, progress=report,
+                )  # fmt: skip
 
 
 @dataclass
@@ -229,40 +235,42 @@ COMMANDS: dict[str, Any] = {
 }
 
 
-def check_scan_deg(scan_deg: float) -> None:
-    """Refuse a scan that is no angle. Raises InputError."""
-    if not 0 < scan_deg <= 360:
-        raise InputError(f"--scan-deg {scan_deg:g}: give over 0 and up to 360")
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 130 when interrupted."""
     command = tyro.extras.subcommand_cli_from_dict(
         COMMANDS, prog="tussock", args=arguments, config=(tyro.conf.FlagCreatePairsOff,),
         description="Insect visual route navigation: grow a world, look around in it, learn a route, walk it home.",
     )  # fmt: skip
-    as_json = command.json
-    # Libraries may print where they like; with --json only the object reaches standard output.
-    output = os.dup(1)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
     try:
-        if as_json:
-            sys.stdout.flush()
-            os.dup2(2, 1)
-        result = command.run()
-        sys.stdout.flush()
-        os.dup2(output, 1)
-        if as_json:
+        if command.json:
+            with standard_output_as_error():
+                result = command.run()
             print(json.dumps(result), flush=True)
         else:
-            show(result)
+            show(command.run())
     except InputError as error:
         fail(str(error))
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except MemoryError as error:
+        fail(f"not enough memory ({error}); take a smaller --size, or fewer views")
     except KeyboardInterrupt:
         say("tussock: interrupted")
         sys.exit(130)
+
+
+@contextmanager
+def standard_output_as_error() -> Iterator[None]:
+    """Send what anyone prints to standard error meanwhile, libraries that write to file descriptor 1 included."""
+    sys.stdout.flush()
+    output = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
     finally:
+        os.dup2(output, 1)
         os.close(output)
 
 

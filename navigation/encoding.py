@@ -114,9 +114,9 @@ class Normalise:
         return centred / np.where(deviation > 1e-6, deviation, np.inf)
 
 
-Step = Grey | SkyMask | Blur | Resize | VerticalEdges | Normalise
-SOURCES: dict[str, type[Step]] = {step.word: step for step in (Grey, SkyMask)}
-FILTERS: dict[str, type[Step]] = {step.word: step for step in (Blur, Resize, VerticalEdges, Normalise)}
+Filter = Grey | SkyMask | Blur | Resize | VerticalEdges | Normalise
+SOURCES: dict[str, type[Filter]] = {step.word: step for step in (Grey, SkyMask)}
+FILTERS: dict[str, type[Filter]] = {step.word: step for step in (Blur, Resize, VerticalEdges, Normalise)}
 PRESETS = {
     "grey": "grey | {blur}{resize}",
     "sky": "sky-mask | {blur}{resize}normalise",
@@ -128,7 +128,7 @@ PRESETS = {
 class Encoding:
     """A chain of steps, applied in order: one source (grey or sky-mask), then any number of filters."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[Filter, ...]
 
     def __call__(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
         """Feature images of views (n, height, width, 3 or 4) uint8."""
@@ -146,7 +146,7 @@ class Encoding:
 
     def __str__(self) -> str:
         return " | ".join(
-            " ".join([step.word, *(f"{getattr(step, f.name):g}" for f in fields(step))]) for step in self.steps
+            " ".join([step.word, *(f"{getattr(step, f.name):.15g}" for f in fields(step))]) for step in self.steps
         )
 
     @classmethod
@@ -183,6 +183,6 @@ class Encoding:
                 f"unknown encoding {name!r}; known: {', '.join(PRESETS)}, or a chain such as '{PRESETS['grey'][:7]}resize 6'"
             )
         text = PRESETS[name].format(
-            blur=f"blur {blur:g} | " if blur else "", resize=f"resize {resize:g} | " if resize != 1 else ""
+            blur=f"blur {blur:.15g} | " if blur else "", resize=f"resize {resize:.15g} | " if resize != 1 else ""
         )
         return cls.parse(text.rstrip(" |"))

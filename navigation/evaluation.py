@@ -46,10 +46,12 @@ def grid_positions(route: Route, *, grid: float, within: float, field: Bounds) -
     """The multiples of `grid` (m) in both axes that lie within `within` (m) of the route and inside the field."""
     if not (np.isfinite(grid) and grid > 0):
         raise InputError(f"a grid of {grid} m; give a spacing over 0")
+    if not (np.isfinite(within) and within >= 0):
+        raise InputError(f"positions within {within} m of the route; give a finite distance")
     low = np.ceil((route.xy.min(axis=0) - within) / grid).astype(int)
     high = np.floor((route.xy.max(axis=0) + within) / grid).astype(int)
-    if (high - low + 1).prod() > 10**7:
-        raise InputError(f"a grid of {grid:g} m has over ten million positions around this route; give a wider one")
+    if (high - low + 1).prod() > 10**6:
+        raise InputError(f"a grid of {grid:g} m has over a million positions around this route; give a wider one")
     x, y = np.meshgrid(np.arange(low[0], high[0] + 1) * grid, np.arange(low[1], high[1] + 1) * grid)
     xy = np.column_stack([x.ravel(), y.ravel()])
     distance, _ = route.nearest(xy) if len(xy) else (np.empty(0), None)
@@ -81,7 +83,7 @@ def heading_errors(
         part = slice(start, start + BATCH)
         # All views face east, so that the answer is not on the grid of rotations by construction.
         views = renderer.render(np.column_stack([positions[part], np.zeros(len(positions[part]))]))
-        familiarity = model.scan(encoding(views)).numpy()
+        familiarity = model.scan(encoding(views)).cpu().numpy()
         windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted[part]])
         headings[part] = best_turn(familiarity, windows, interpolate)
         progress(min(start + BATCH, len(positions)), len(positions))

@@ -4,7 +4,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -12,13 +12,23 @@ from world.errors import InputError
 
 from .terminal import progress, say
 
+if TYPE_CHECKING:
+    import numpy as np
+
+    from render.renderer import Renderer
+    from world.geometry import Route
+    from world.scene import World
+
+    from .encoding import Encoding
+    from .familiarity import FamiliarityModel
+
 WORLD = (
     "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
 )
 
 
 @dataclass
-class Sight:
+class SightOptions:
     """What world is seen, through what eye."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
@@ -71,7 +81,7 @@ class Sight:
 
 
 @dataclass
-class Learning(Sight):
+class LearningOptions(SightOptions):
     """What is learned, and from which views."""
 
     route: Path | None = None
@@ -91,13 +101,14 @@ class Learning(Sight):
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
 
-    def prepare(self):
-        """The world, the route (resampled), the encoding and the untrained model: everything that can be refused early."""
+    def prepare(self) -> "Lesson":
+        """Everything that a model is to learn, and everything that can be refused before long work begins."""
         from world.files import read_route
         from world.walk import generate_route
 
         from .encoding import Encoding
         from .models import make_model
+        from .training import training_poses
 
         model = make_model(self.model, self.seed)
         automatic = 1.0 if "|" in self.encoding else max(1.0, self.width_and_height()[0] / 120)
@@ -106,20 +117,36 @@ class Learning(Sight):
         )
         route = read_route(self.route) if self.route else None
         world = self.open_world()
-        route = (route or generate_route(world, self.seed)).resampled(self.spacing_m)
+        route = route or generate_route(world, self.seed)
         inside = world.field.contains(*route.xy.T)
         if not inside.all():
             x, y = route.xy[~inside][0]
             raise InputError(
                 f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
             )
-        return world, route, encoding, model
+        views = route.resampled(self.spacing_m)
+        poses = training_poses(views, every=self.every, learning_walk=self.learning_walk_m, field=world.field)
+        return Lesson(world=world, route=route, route_views=views, poses=poses, encoding=encoding, model=model)
 
-    def learn(self, model, encoding, renderer, route):
-        """Train the model; return the poses whose views it learned."""
-        from .training import learn, training_poses
 
-        poses = training_poses(route, every=self.every, learning_walk=self.learning_walk_m, field=renderer.world.field)
+@dataclass(frozen=True, kw_only=True)
+class Lesson:
+    """A world, a route through it, and what is to be learned there.
+
+    route_views: the route's poses at the spacing of its views. poses: (n, 3) all that views are learned from.
+    """
+
+    world: "World"
+    route: "Route"
+    route_views: "Route"
+    poses: "np.ndarray"
+    encoding: "Encoding"
+    model: "FamiliarityModel"
+
+    def teach(self, renderer: "Renderer") -> "np.ndarray":
+        """Train the model, showing progress; return the poses whose views it learned."""
+        from .training import learn
+
         say(f"renderer: {renderer.backend}")
         with progress("learning", "views") as report:
-            return learn(model, encoding, renderer, poses, report)
+            return learn(self.model, self.encoding, renderer, self.poses, report)

@@ -9,6 +9,7 @@ import shutil
 import socket
 import subprocess
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -29,7 +30,6 @@ from world.scene import World
 
 from .agent import Step
 
-VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
 TIMELINE = "step"
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
@@ -51,22 +51,23 @@ class Recording:
     ):  # fmt: skip
         self._renderer, self._training_poses = renderer, training_poses
         self._previous: Step | None = None
-        self._stream = rr.RecordingStream("tussock")
+        self._streams = [rr.RecordingStream("tussock")]
         blueprint = _blueprint(route, lost)
-        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.FileSink(str(path))]
+        self._streams[0].save(path, default_blueprint=blueprint)
         if live is not None:
             check_viewer(live)
-            sinks.append(rr.GrpcSink(live))
-        self._stream.set_sinks(*sinks, default_blueprint=blueprint)
+            self._streams.append(rr.RecordingStream("tussock"))
+            self._streams[1].connect_grpc(live, default_blueprint=blueprint)
         self._log_surroundings(world, route, title)
         self._flush()
 
     def log(self, step: Step) -> None:
         """Add one step."""
-        stream, pose = self._stream, step.pose
-        stream.set_time(TIMELINE, sequence=step.index)
+        pose = step.pose
+        for stream in self._streams:
+            stream.set_time(TIMELINE, sequence=step.index)
         here = [pose.x, pose.y, ABOVE]
-        stream.log(
+        self._log(
             "world/agent",
             rr.Arrows3D(
                 origins=[here], vectors=[_direction(pose.heading + step.turn, 0.2)], colors=PATH_COLOUR, radii=0.012
@@ -74,25 +75,25 @@ class Recording:
         )
         if self._previous is not None and step.reset is None:
             before = self._previous.pose
-            stream.log(
+            self._log(
                 "world/path", rr.LineStrips3D([[[before.x, before.y, ABOVE], here]], colors=PATH_COLOUR, radii=0.008)
             )
-        stream.log("view", rr.Image(step.view[..., :3]))
+        self._log("view", rr.Image(step.view[..., :3]))
         self._log_match(step)
         width = len(step.familiarity)
         order = np.argsort(-turn_of_columns(np.arange(width), width))
         degrees_right = -np.degrees(turn_of_columns(order, width))
         # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
-        stream.log(
+        self._log(
             "familiarity",
             rr.BarChart(step.familiarity[order] - step.familiarity.min(), abscissa=degrees_right, color=MATCH_COLOUR),
         )
-        stream.log("deviation/m", rr.Scalars(step.deviation))
-        stream.log("error/degrees", rr.Scalars(np.degrees(step.error)))
+        self._log("deviation/m", rr.Scalars(step.deviation))
+        self._log("error/degrees", rr.Scalars(np.degrees(step.error)))
         event = step.reason or (step.reset and f"{step.reset}: put back on the route")
         if event:
             level = rr.TextLogLevel.INFO if step.reason == "arrived" else rr.TextLogLevel.WARN
-            stream.log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
+            self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
         self._previous = step
         if time.monotonic() - self._flushed > FLUSH_SECONDS:
             self._flush()
@@ -100,11 +101,23 @@ class Recording:
     def close(self) -> None:
         """Write what is left and close the file."""
         self._flush()
-        self._stream.disconnect()
+        for stream in self._streams:
+            stream.disconnect()
+
+    def _log(self, entity: str, what: rr.AsComponents, *, static: bool = False) -> None:
+        for stream in self._streams:
+            stream.log(entity, what, static=static)
 
     def _flush(self) -> None:
         """Bring what was logged to disk; rerun by itself holds small things back until there are megabytes of them."""
-        self._stream.flush()
+        file, *viewers = self._streams
+        file.flush()
+        for viewer in viewers:
+            try:
+                viewer.flush(timeout_sec=5)
+            except RuntimeError as error:  # somebody closed it; the walk and its file go on
+                warnings.warn(f"the live viewer is gone ({error}); the walk goes on without it", stacklevel=2)
+                self._streams.remove(viewer)
         self._flushed = time.monotonic()
 
     def __enter__(self) -> "Recording":
@@ -115,7 +128,7 @@ class Recording:
 
     def _log_surroundings(self, world: World, route: Route, title: str) -> None:
         """What does not change: the world, the route, where views were learned, the axes' names."""
-        log = self._stream.log
+        log = self._log
         log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         triangles, rgb = world.surfaces()
         colours = np.repeat(rgb, 3, axis=0)
@@ -144,11 +157,11 @@ class Recording:
         if step.match is None or self._training_poses is None or self._renderer is None:
             return
         x, y, heading = self._training_poses[step.match]
-        self._stream.log("recognised", rr.Image(self._renderer.render(self._training_poses[[step.match]])[0, ..., :3]))
+        self._log("recognised", rr.Image(self._renderer.render(self._training_poses[[step.match]])[0, ..., :3]))
         arrow = rr.Arrows3D(
             origins=[[x, y, ABOVE]], vectors=[_direction(heading, 0.15)], colors=MATCH_COLOUR, radii=0.008
         )
-        self._stream.log("world/recognised", arrow)
+        self._log("world/recognised", arrow)
 
 
 def check_viewer(url: str) -> None:
@@ -214,6 +227,10 @@ def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
             yield viewer
         finally:
             viewer.terminate()
+            try:
+                viewer.wait(timeout=5)
+            except subprocess.TimeoutExpired:
+                viewer.kill()
 
 
 def _direction(heading: float, length: float) -> list[float]:

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,26 +31,42 @@ RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
 FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE)
 
 
-def check_free(out: Path, *, overwrite: bool = False, viewer: str | None = None) -> None:
-    """Refuse a folder that holds a run (unless it is to be overwritten), or a viewer that does not listen; touch nothing."""
+def check_run_folder(
+    out: Path, *, overwrite: bool = False, inputs: Sequence[Path] = (), viewer: str | None = None
+) -> None:
+    """Refuse, before long work, what `record_walk` would refuse after it; touch nothing. Raises InputError.
+
+    inputs: files of the person's that must not be replaced. viewer: address of a viewer that must be listening.
+    """
     if viewer is not None:
         check_viewer(viewer)
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file; give a folder for the run")
+    existing = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
+    if not existing.is_dir():
+        raise InputError(f"{out} cannot be written: {existing} is a file; give a folder for the run")
+    if not os.access(existing, os.W_OK):
+        raise InputError(f"{out} cannot be written: {existing} is read-only; give another --out")
     earlier = _run_files(out)
     if earlier and not overwrite:
         raise InputError(
             f"{out} already holds a run ({earlier[0].name}); give another --out, or --overwrite to replace it"
         )
+    for path in earlier:
+        if any(given.exists() and given.samefile(path) for given in inputs):
+            raise InputError(f"{path} is used by this run and would be replaced by it; give another --out")
 
 
-def claim(out: Path) -> None:
-    """Make the folder of a run, without the files of an earlier one. Raises InputError where it cannot be written."""
+def _claim(out: Path, overwrite: bool) -> None:
+    """Make the folder of a run, this one's alone. Raises InputError where another run holds it or it cannot be written."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for path in _run_files(out):
-            path.unlink()
-        (out / RECORDING).touch()
+        if overwrite:
+            for path in _run_files(out):
+                path.unlink()
+        (out / RECORDING).open("xb").close()  # fails where another run was quicker
+    except FileExistsError:
+        raise InputError(
+            f"{out} already holds a run ({RECORDING}); give another --out, or --overwrite to replace it"
+        ) from None
     except OSError as error:
         raise InputError(f"{out} cannot be written ({error.strerror}); give another --out") from error
 
@@ -60,14 +76,16 @@ def _run_files(out: Path) -> list[Path]:
 
 
 def record_walk(
-    agent: Agent, start: Pose, out: Path, *, training_poses: Float[np.ndarray, "n 3"] | None = None,
+    agent: Agent, start: Pose, out: Path, *, overwrite: bool = False, training_poses: Float[np.ndarray, "n 3"] | None = None,
     settings: dict[str, Any] | None = None, viewer: str | None = None, progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Walk from start and leave the walk in the folder `out`; return its summary.
+    """Walk from start and leave the walk in the folder `out`; return its summary, whose times are those of the walk alone.
 
-    training_poses: of the views the model knows, in their order: shows the recognised view in the recording. settings: kept in
-    summary.json. progress(done, total): steps, of the most there can be.
+    overwrite: replace the run that the folder holds. training_poses: of the views the model knows, in their order: shows the
+    recognised view in the recording. settings: kept in summary.json. progress(done, total): steps, of the most there can be.
+    An interrupted walk leaves its recording and trajectory, and no summary.
     """
+    _claim(out, overwrite)
     world, route, trajectory = agent.renderer.world, agent.route, Trajectory()
     began = time.perf_counter()
     with Recording(
@@ -80,14 +98,16 @@ def record_walk(
         live=viewer,
         title=_about(settings),
     ) as recording:
-        for step in agent.walk(start):
-            recording.log(step)
-            trajectory.add(step)
-            progress(step.index, agent.step_limit)
+        try:
+            for step in agent.walk(start):
+                recording.log(step)
+                trajectory.add(step)
+                progress(step.index, agent.step_limit)
+        finally:
+            trajectory.write(out / TRAJECTORY)
     seconds = time.perf_counter() - began
     summary = trajectory.summary()
     summary |= {"seconds": seconds, "steps_per_second": (len(trajectory) - 1) / seconds, "recording": RECORDING}
-    trajectory.write(out / TRAJECTORY)
     write_route(route, out / ROUTE)
     title = f"{summary['reason']} after {summary['steps']} steps, {summary['mean_deviation_m']:.3f} m off the route on average"
     overview(world, out / PICTURE, route=route, walk=trajectory.xy, title=title)

@@ -38,12 +38,13 @@ def training_poses(
     heading = poses[:, 2]
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
     ahead = route.at(route.arc[::every] + AHEAD)[:, :2]
-    batches = [poses]
+    batches = []
     for share in SIDES:
         for side in (1, -1):
             xy = poses[:, :2] + side * share * learning_walk * left
             aim = ahead - xy
             batches.append(np.column_stack([xy, np.arctan2(aim[:, 1], aim[:, 0])]))
+    batches.append(poses)  # last, so that the last view of all is the route's own at its end
     every_pose = np.stack(batches, axis=1).reshape(-1, 3)  # in the order of the route
     every_pose[:, 2] = wrap_angle(every_pose[:, 2])
     if field is not None:

@@ -7,6 +7,8 @@ from jaxtyping import Float
 
 from world.errors import InputError
 
+MOST_RAYS = 10**8  # a gigabyte to draw with
+
 
 @dataclass(frozen=True, kw_only=True)
 class Eye:
@@ -39,6 +41,10 @@ class Eye:
             raise InputError(f"eye height {self.z} m; give a finite height")
         if self.samples is not None and not 1 <= self.samples <= 64:
             raise InputError(f"{self.samples} samples a pixel side; give 1 to 64")
+        if self.width * self.height * self.rays**2 > MOST_RAYS:
+            raise InputError(
+                f"{self.width} x {self.height} pixels of {self.rays} x {self.rays} rays are over {MOST_RAYS:,}; give fewer"
+            )
 
     @property
     def rays(self) -> int:

@@ -1,5 +1,6 @@
 """The loop: what a step is, why walks end, and what brings an agent back."""
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,7 @@ from navigation.trajectory import COLUMNS, Trajectory
 from render.eye import Eye
 from render.renderer import open_renderer
 from world.errors import InputError
-from world.geometry import Pose, Route, wrap_angle
+from world.geometry import Bounds, Pose, Route, wrap_angle
 from world.scene import World
 from world.walk import generate_route
 
@@ -166,6 +167,48 @@ def test_a_route_that_ends_where_it_starts_is_walked_around(renderer):
     assert 50 < len(steps) < 66
 
 
+def test_a_walk_always_ends_with_a_reason(renderer):
+    # It is lost on its very last step, when putting it back would be of no use.
+    settings = {"scan": 2 * np.pi, "lost": 0.1, "reset_when_lost": True, "step_length": 0.3}
+    free = list(agent(renderer, STRAIGHT, Turner(30), **settings).walk(STRAIGHT.start))
+    lost_at = next(step.index for step in free if step.reset) - 1
+    steps = list(agent(renderer, STRAIGHT, Turner(30), **settings, max_steps=lost_at).walk(STRAIGHT.start))
+    assert steps[-1].index == lost_at
+    assert steps[-1].reason == LOST
+
+
+def test_an_agent_that_starts_near_the_end_arrives(renderer):
+    steps = list(agent(renderer, STRAIGHT, Turner(0)).walk(Pose(2.1, 1.5, 0.0)))
+    assert steps[-1].reason == ARRIVED
+    assert len(steps) < 8
+
+
+def test_a_mirrored_world_mirrors_the_walk(renderer, route):
+    def flipped(poses):
+        return poses * np.array([1, -1, -1])
+
+    world = renderer.world
+    x0, y0, x1, y1 = world.field
+    mirrored = dataclasses.replace(
+        world, triangles=world.triangles * np.float32([1, -1, 1]), field=Bounds(x0, -y1, x1, -y0), ground=None
+    )
+    level = dataclasses.replace(world, ground=None)
+    poses = training_poses(route, learning_walk=0.2)
+    # Grey, since vertical edges stand half a column to the right of what makes them.
+    encoding = Encoding.parse("grey | resize 3")
+    walks = []
+    for seen, mirror in ((level, np.asarray), (mirrored, flipped)):
+        with open_renderer(seen, renderer.eye, "cpu") as opened:
+            model = PerfectMemory()
+            learn(model, encoding, opened, mirror(poses))
+            walker = Agent(
+                renderer=opened, encoding=encoding, model=model, route=Route(mirror(route.poses)), max_steps=15, lost=9
+            )
+            walks.append(list(walker.walk(Pose(*mirror(np.array(route.start.moved(0.0, 0.1))).tolist()))))
+    for step, image in zip(*walks, strict=True):
+        assert np.allclose(flipped(np.array(step.pose)), image.pose, atol=0.02)
+
+
 def test_a_scan_about_a_fixed_direction_keeps_to_it(renderer, route, memory):
     walker = agent(renderer, route, memory, scan=np.pi / 3, scan_about=1.0, lost=9, max_steps=8)
     for step in walker.walk(Pose(1.5, 1.5, -2.5)):
@@ -188,6 +231,8 @@ def test_a_start_outside_the_world_is_refused(renderer, route, memory):
         {"heading_noise": -1},
         {"max_steps": 0},
         {"patience": np.inf},
+        {"scan": 0},
+        {"scan_about": np.nan},
     ],
 )
 def test_settings_that_make_no_sense_are_refused(renderer, route, memory, settings):
@@ -197,8 +242,8 @@ def test_settings_that_make_no_sense_are_refused(renderer, route, memory, settin
 
 def test_a_learning_walk_looks_ahead_from_both_sides():
     poses = training_poses(STRAIGHT, every=10, learning_walk=0.2).reshape(-1, 1 + 2 * len(SIDES), 3)
-    assert np.array_equal(poses[:, 0], STRAIGHT.poses[::10])
-    assert np.allclose(poses[0, 1:, 1] - 1.5, [0.05, -0.05, 0.1, -0.1, 0.2, -0.2])
+    assert np.array_equal(poses[:, -1], STRAIGHT.poses[::10])  # the last view is the one at the end of the route
+    assert np.allclose(poses[0, :-1, 1] - 1.5, [0.05, -0.05, 0.1, -0.1, 0.2, -0.2])
     for x, y, heading in poses[0]:
         assert np.isclose(y + np.tan(heading) * (0.5 + AHEAD - x), 1.5)  # each looks at the point AHEAD on the route
     assert np.array_equal(training_poses(STRAIGHT, every=3), STRAIGHT.poses[::3])

@@ -1,9 +1,12 @@
 """The command line as a contract: names, flags, keys, exit codes, and what it leaves behind."""
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import cv2
@@ -132,7 +135,10 @@ def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path):
             capture_output=True,
         )
         run = [TUSSOCK, *map(str, RUN), "--world", "w.glb", "--out", "run", "--json"]
-        subprocess.run(run, cwd=folder, check=True, capture_output=True)
+        # The number of threads is another machine's: nothing may depend on it.
+        threads = os.environ | ({"OMP_NUM_THREADS": "1"} if name == "b" else {})
+        done = subprocess.run(run, cwd=folder, check=True, capture_output=True, text=True, env=threads)
+        assert json.loads(done.stdout)["reason"]  # one object and nothing else
     for name in ("w.glb", "run/route.csv", "run/trajectory.csv", "run/overview.png"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
     a, b = (json.loads((tmp_path / name / "run" / "summary.json").read_text()) for name in ("a", "b"))
@@ -163,6 +169,20 @@ BAD = {
     "a scan of nothing": (["evaluate", *SMALL, "--scan-deg", "0"], "scan"),
     "no spacing": (["evaluate", *SMALL, "--spacing-m", "0"], "spacing"),
     "every 0": (["evaluate", *SMALL, "--every", "0"], "every 0"),
+    "every 0 in a run": (["run", *SMALL, "--every", "0", "--out", "r"], "every 0"),
+    "a learning walk of -1 m": (["run", *SMALL, "--learning-walk-m", "-1", "--out", "r"], "learning walk of -1"),
+    "views that show nothing": (
+        ["run", *SMALL, "--encoding", "sky", "--top-deg", "-5", "--out", "r"],
+        "training views shows anything",
+    ),
+    "a scan about nowhere": (["run", *SMALL, "--scan-about-deg", "nan", "--out", "r"], "scan about nan"),
+    "within nowhere": (["evaluate", *SMALL, "--within-m", "nan"], "within nan m"),
+    "too many rays": (["view", "--world", "tiny", "--size", "32768x16384", "--samples", "64"], "give fewer"),
+    "too many views": (["evaluate", *SMALL, "--spacing-m", "1e-9"], "over a million"),
+    "an input that would be replaced": (
+        ["run", *SMALL, "--route", "in/route.csv", "--out", "in", "--overwrite"],
+        "would be replaced",
+    ),
     "a start outside": (["run", *SMALL, "--offset-m", "50", "--out", "r"], "outside the world"),
     "neither stop nor reset": (["run", *SMALL, "--on-lost", "cry", "--out", "r"], "stop or reset"),
     "a file for a folder": (["run", *SMALL, "--out", "one.csv"], r"one\.csv is a file"),
@@ -183,6 +203,8 @@ def test_bad_input_is_one_line_exit_2_and_leaves_nothing(capfd, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     Path("odd.bin").write_bytes(b"\0" * 100)
     Path("nan.csv").write_text("x_m,y_m,heading_deg\n1,1,0\nnan,1,0\n2,2,0\n")
+    Path("in").mkdir()
+    Path("in/route.csv").write_text("x_m,y_m,heading_deg\n1,1,0\n2,2,0\n")
     Path("one.csv").write_text("x_m,y_m,heading_deg\n1,1,0\n")
     Path("far.csv").write_text("x_m,y_m,heading_deg\n1,1,0\n100,1,0\n")
     tussock(capfd, "world", "--preset", "tiny", "--out", "cut.glb")
@@ -191,10 +213,53 @@ def test_bad_input_is_one_line_exit_2_and_leaves_nothing(capfd, tmp_path, monkey
     code, out, err = tussock(capfd, *arguments)
     assert code == 2
     assert out == ""
-    lines = err.splitlines()
+    lines = [line for line in err.splitlines() if line != "renderer: cpu"]
     assert len(lines) == 1, err
     assert re.search(message, lines[0]), lines
     assert files(tmp_path) == before
+
+
+def start(*arguments, cwd: Path) -> subprocess.Popen:
+    """A command in its own process."""
+    command = [TUSSOCK, *map(str, arguments)]
+    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+LONG = ["run", "--world", "tiny", "--seed", "2", "--size", "720x150", "--resize", "1"]
+
+
+def test_ctrl_c_while_learning_leaves_the_earlier_run(capfd, tmp_path):
+    tussock(capfd, *RUN, "--out", tmp_path / "run")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "run").iterdir()}
+    with start(*LONG, "--spacing-m", "0.001", "--out", "run", "--overwrite", cwd=tmp_path) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "renderer: cpu\n"  # it is learning
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate()
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "tussock: interrupted"
+    assert before == {path.name: path.read_bytes() for path in (tmp_path / "run").iterdir()}
+
+
+@pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_walk_leaves_its_recording_and_trajectory(tmp_path, end, code):
+    with start(*LONG, "--step-m", "0.001", "--out", "run", cwd=tmp_path) as process:
+        while not (tmp_path / "run" / "recording.rrd").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        time.sleep(1)
+        process.send_signal(end)
+        process.communicate()
+    assert process.returncode == code
+    assert files(tmp_path / "run") == {"recording.rrd", "trajectory.csv"}
+    assert len((tmp_path / "run" / "trajectory.csv").read_text().splitlines()) > 2
+
+
+def test_two_runs_into_one_folder_at_once_are_one_run(tmp_path):
+    both = [start(*RUN, "--out", "run", cwd=tmp_path) for _ in range(2)]
+    errors = [process.communicate()[1] for process in both]
+    assert sorted(process.returncode for process in both) == [0, 2]
+    assert "already holds a run" in "".join(errors)
 
 
 def test_a_renderer_that_is_not_there_is_an_error_and_not_another_one():

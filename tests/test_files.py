@@ -5,6 +5,7 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from jaxtyping import TypeCheckError
 from PIL import Image
 from scenes import random_world
 
@@ -100,6 +101,22 @@ def test_textures_are_averaged_over_each_triangle_and_kept_for_gl(tmp_path):
         write_world(world, tmp_path / "square.ply")
 
 
+def test_many_textured_meshes_keep_their_order(tmp_path):
+    squares = []
+    for i in range(13):
+        square = textured_square(np.full((8, 8, 3), 10 * i, np.uint8))
+        square.apply_translation([i, 0, 0])
+        squares.append(square)
+    plain = trimesh.creation.box()
+    plain.visual.face_colors = (9, 90, 200, 255)
+    trimesh.Scene([*squares, plain]).export(tmp_path / "squares.glb")
+    world = read_world(tmp_path / "squares.glb")
+    write_world(world, tmp_path / "again.glb")
+    again = read_world(tmp_path / "again.glb")
+    assert same(again, world)
+    assert len(again.textured) == 14
+
+
 def test_a_route_comes_back_from_csv(tmp_path):
     route = Route(np.array([[0.1, 1 / 3, 0.5], [1.0, -2.0, -3.0], [4.0, 5.0, 3.0]]))
     write_route(route, tmp_path / "r.csv")
@@ -128,6 +145,7 @@ BAD_ROUTES = {
     "x_m,y_m,heading_deg\n0,0,0\n0,0,9\n": "at least 2 distinct",
     "a,b,c\n0,0,0\n": "line 1: the columns are 'a,b,c'",
     "": "line 1",
+    'x_m,y_m\n"' + "1" * 200_000 + '",2\n': "cannot be read as CSV",
 }
 
 
@@ -199,8 +217,20 @@ def test_what_cannot_be_written_is_refused(tmp_path):
         write_world(world, tmp_path / "nowhere" / "w.glb")
     with pytest.raises(InputError, match=r"\.glb or \.ply"):
         write_world(world, tmp_path / "w.obj")
+    with pytest.raises(InputError, match="no triangles"):
+        write_world(random_world(n=0), tmp_path / "w.glb")
 
 
 def make(folder):
     folder.mkdir()
     return folder
+
+
+def test_worlds_whose_arrays_do_not_fit_are_refused():
+    world = random_world(n=5)
+    for change in ({"rgb": world.rgb[:4]}, {"rgb": world.rgb / 255}, {"triangles": world.triangles.astype(float)}):
+        with pytest.raises((InputError, TypeCheckError)):
+            World(**{**vars(world), **change})
+    mine = np.zeros((1, 3, 3), dtype=np.float32)
+    World(**{**vars(world), "triangles": mine, "rgb": world.rgb[:1]})
+    mine[0, 0, 0] = 1  # still mine

@@ -6,6 +6,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jaxtyping import TypeCheckError
+from sklearn.neural_network import MLPClassifier
 
 from navigation import rotation
 from navigation.familiarity import FamiliarityModel, SnapshotModel
@@ -155,7 +156,6 @@ def test_mlp_scan_equals_the_network_on_rolled_views():
 
 
 def test_mlp_learns_as_scikit_learns_classifier_does():
-    sklearn = pytest.importorskip("sklearn.neural_network")
     random = np.random.default_rng(0)
     pattern = torch.as_tensor(random.normal(size=(5, 24)), dtype=torch.float32)
     data = pattern + 1.5 * views(300, 4)
@@ -163,7 +163,7 @@ def test_mlp_learns_as_scikit_learns_classifier_does():
     ours = MLP(seed=1).fit(train)
     images, labels = ours.training_data(test)
     right = ((ours.scan(images)[:, 0] > 0) == (labels > 0.5)).float().mean().item()
-    theirs = sklearn.MLPClassifier(max_iter=600, random_state=1)
+    theirs = MLPClassifier(max_iter=600, random_state=1)
     train_images, train_labels = ours.training_data(train)
     theirs.fit(train_images.flatten(start_dim=1).numpy(), train_labels.numpy())
     their_right = theirs.score(images.flatten(start_dim=1).numpy(), labels.numpy())

@@ -65,7 +65,7 @@ def read_world(path: str | os.PathLike) -> World:
         raise InputError(f"{path}: unknown kind of world {path.suffix!r}; give .glb, .ply, .obj, .stl or AntWorld .bin")
     try:
         scene = trimesh.load_scene(path, process=False)
-        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+        meshes = [mesh for mesh in _in_order(scene) if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
     except Exception as error:  # trimesh's readers raise whatever their parsers do
         raise InputError(f"{path} cannot be read as a mesh ({_reason(error)}); is it complete?") from error
     if not meshes:
@@ -100,6 +100,8 @@ def write_world(world: World, path: str | os.PathLike) -> None:
     if suffix == ".ply" and world.textured:
         raise InputError(f"{path}: a .ply cannot hold this world's textures; write it as .glb")
     n = len(world.triangles)
+    if n == 0:
+        raise InputError(f"{path}: this world holds no triangles; there is nothing to write")
     rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
     mesh = trimesh.Trimesh(
         world.triangles.reshape(-1, 3),
@@ -108,7 +110,8 @@ def write_world(world: World, path: str | os.PathLike) -> None:
         process=False,
     )
     if suffix == ".glb":
-        scene = trimesh.Scene(list(world.textured) or [mesh])
+        meshes = world.textured or (mesh,)
+        scene = trimesh.Scene({f"{i:06d}": mesh for i, mesh in enumerate(meshes)})
         scene.metadata[KEY] = _to_json(world)
         data = bytes(scene.export(file_type="glb"))  # type: ignore[arg-type]
     else:
@@ -135,6 +138,8 @@ def read_route(path: str | os.PathLike) -> Route:
             return _read_route_csv(path)
         x, y, heading = _read_planes(path, 3, "an AntWorld route")
         return Route(np.column_stack([x / 100, y / 100, np.radians(heading)]))
+    except csv.Error as error:
+        raise InputError(f"{path} cannot be read as CSV ({error}); is it a route?") from error
     except InputError as error:
         message = str(error)
         raise error if message.startswith(str(path)) else InputError(f"{path}: {message}") from error
@@ -258,6 +263,17 @@ def _read_ply_comment(path: Path) -> dict[str, Any] | None:
             if line.startswith(b"end_header"):
                 break
     return None
+
+
+def _in_order(scene) -> list:
+    """A scene's meshes where they stand, in the order of their names, which is the order they were written in."""
+    meshes = []
+    for node in sorted(scene.graph.nodes_geometry):
+        transform, name = scene.graph[node]
+        mesh = scene.geometry[name].copy()
+        mesh.apply_transform(transform)
+        meshes.append(mesh)
+    return meshes
 
 
 def _texture(mesh) -> Any:

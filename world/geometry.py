@@ -137,11 +137,19 @@ class Route:
             raise InputError(
                 f"spacing {spacing:g} m does not fit a route of {self.length:.3f} m; give 0 < spacing <= length"
             )
+        if self.length / spacing > 10**6:
+            raise InputError(
+                f"spacing {spacing:g} m cuts a route of {self.length:.3f} m into over a million; give a wider one"
+            )
         return Route(self.at(np.arange(0.0, self.length * (1 + 1e-12), spacing)))
 
     def nearest(self, xy: Float[np.ndarray, "k 2"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
         """Distance to the route's polyline (m), and how far along the route (m) that nearest place is, of points."""
         xy = np.asarray(xy, dtype=np.float64)
+        at_once = max(1, 10**6 // len(self.xy))  # bounds the memory of all distances
+        if len(xy) > at_once:
+            parts = [self.nearest(xy[i : i + at_once]) for i in range(0, len(xy), at_once)]
+            return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
         start, step = self.xy[:-1], np.diff(self.xy, axis=0)
         length = np.hypot(*step.T)
         offset = xy[:, None] - start  # (k, n - 1, 2)

@@ -24,7 +24,7 @@ class Ground:
     bounds: Bounds
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class World:
     """Everything there is to see, immutable.
 
@@ -46,6 +46,14 @@ class World:
     textured: tuple[Any, ...] = ()
 
     def __post_init__(self):
+        for name, shape, kind in (
+            ("triangles", (len(self.triangles), 3, 3), np.float32),
+            ("rgb", (len(self.triangles), 3), np.uint8),
+        ):
+            array = getattr(self, name)
+            if array.shape != shape or array.dtype != kind:
+                raise InputError(f"{name} of a world are {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
+            object.__setattr__(self, name, array.copy())
         if not np.isfinite(self.triangles).all():
             bad = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
             raise InputError(f"triangle {bad} of the world has a corner that is not finite; repair the mesh")

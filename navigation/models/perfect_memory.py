@@ -38,8 +38,8 @@ class PerfectMemory:
         n, _, width = views.shape
         centred = views - self._level
         energies = centred.square().sum(dim=(1, 2))
-        best = torch.full((n, width), torch.inf)
-        index = torch.zeros((n, width), dtype=torch.int64)
+        best = torch.full((n, width), torch.inf, device=views.device)
+        index = torch.zeros((n, width), dtype=torch.int64, device=views.device)
         if n == 0:
             return best, index
         for part, correlation in self._bank.chunks(centred):
@@ -54,10 +54,11 @@ class PerfectMemory:
         return -(squared.clamp(min=0) / pixels).sqrt(), index
 
     def _rescore(self, views: Images, squared: torch.Tensor, index: torch.Tensor, tolerance: torch.Tensor) -> None:
-        """Replace the squared distances that rounding leaves in doubt about being the smallest by exact ones, in place."""
+        """Make the squared distances exact that rounding leaves in doubt about being the smallest, and their neighbours, in place."""
         assert self.snapshots is not None
         doubtful = squared <= squared.min(dim=1, keepdim=True).values + tolerance[:, None]
+        doubtful |= doubtful.roll(1, dims=1) | doubtful.roll(-1, dims=1)  # a heading is interpolated from three
         for view, row, snapshot, mask in zip(views, squared, index, doubtful, strict=True):
-            turns = torch.nonzero(mask)[:, 0]
-            difference = rotations(view, turns).double() - self.snapshots[snapshot[turns]]
-            row[turns] = difference.square().sum(dim=(1, 2)).float()
+            for turns in torch.nonzero(mask)[:, 0].split(32):
+                difference = rotations(view, turns).double() - self.snapshots[snapshot[turns]]
+                row[turns] = difference.square().sum(dim=(1, 2)).float()
