@@ -104,6 +104,38 @@ def _rows_between(low, high, tangents, table):
     return first, last
 
 
+@numba.njit(cache=True, nogil=True, inline="always")
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _set_edge(k, normal, volume, p, q, side):
+    """Edge k's bound on t: p cos + q sin, from below (side 1) or above (-1); side 0: a vertical plane, p cos + q sin >= 0."""
+    nx, ny, nz = normal
+    if abs(nz) < 1e-200:
+        sign = 1.0 if volume > 0.0 else -1.0
+        p[k], q[k], side[k] = sign * nx, sign * ny, 0
+    else:
+        p[k], q[k] = -nx / nz, -ny / nz
+        side[k] = 1 if (nz > 0.0) == (volume > 0.0) else -1
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _interval(p, q, side, cos, sin):
+    """The tangents that a triangle's three edges leave in a column: low > high where none."""
+    low, high = -np.inf, np.inf
+    for k in range(3):
+        t = p[k] * cos + q[k] * sin
+        if side[k] > 0:
+            low = max(low, t)
+        elif side[k] < 0:
+            high = min(high, t)
+        elif t < 0.0:
+            low = np.inf
+    return low, high
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _draw(triangles, columns, cull, eye, cosines, sines, tangents, table, start, stop, nearness, seen):
     """Draw all triangles into columns start..stop-1: the nearest triangle of each pixel into `seen` (-1: none).
@@ -114,60 +146,38 @@ def _draw(triangles, columns, cull, eye, cosines, sines, tangents, table, start,
     width = cosines.size
     nearness[start:stop] = 0.0
     seen[start:stop] = -1
-    a, b, c = np.empty(3), np.empty(3), np.empty(3)
-    p, q = np.empty(3), np.empty(3)  # an edge's bound on t is p cos + q sin
-    side = np.empty(
-        3, np.int64
-    )  # +1: a lower bound, -1: an upper, 0: the edge's plane is vertical, p cos + q sin >= 0 is the test
+    p, q, side = np.empty(3), np.empty(3), np.empty(3, np.int64)
     for i in range(triangles.shape[0]):
         first, last = _column_range(columns[0, i], columns[1, i], columns[2, i], width)
         if first > last or (first >= stop and last < start + width) or (last < start):
             continue
-        for k in range(3):
-            a[k] = triangles[i, 0, k] - eye[k]
-            b[k] = triangles[i, 1, k] - eye[k]
-            c[k] = triangles[i, 2, k] - eye[k]
-        bx, by, bz = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
-        volume = a[0] * bx + a[1] * by + a[2] * bz
+        a = triangles[i, 0, 0] - eye[0], triangles[i, 0, 1] - eye[1], triangles[i, 0, 2] - eye[2]
+        b = triangles[i, 1, 0] - eye[0], triangles[i, 1, 1] - eye[1], triangles[i, 1, 2] - eye[2]
+        c = triangles[i, 2, 0] - eye[0], triangles[i, 2, 1] - eye[1], triangles[i, 2, 2] - eye[2]
+        opposite = _cross(b, c)
+        volume = a[0] * opposite[0] + a[1] * opposite[1] + a[2] * opposite[2]
         if volume == 0.0 or (cull and volume > 0.0):
             continue
-        cx, cy, cz = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
-        ax, ay, az = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-        # N = (b - a) x (c - a) is the sum of the three edge normals, but precise only when taken from the differences.
-        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        gx, gy, gz = (uy * vz - uz * vy) / volume, (uz * vx - ux * vz) / volume, (ux * vy - uy * vx) / volume
-        for k, (nx, ny, nz) in enumerate(((ax, ay, az), (bx, by, bz), (cx, cy, cz))):
-            if abs(nz) < 1e-200:
-                sign = 1.0 if volume > 0.0 else -1.0
-                p[k], q[k], side[k] = sign * nx, sign * ny, 0
-            else:
-                p[k], q[k] = -nx / nz, -ny / nz
-                side[k] = 1 if (nz > 0.0) == (volume > 0.0) else -1
+        _set_edge(0, _cross(a, b), volume, p, q, side)
+        _set_edge(1, opposite, volume, p, q, side)
+        _set_edge(2, _cross(c, a), volume, p, q, side)
+        # The plane's normal is the sum of the three edges' normals, but precise only when taken from the differences.
+        gx, gy, gz = _cross((b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2]))
+        gx, gy, gz = gx / volume, gy / volume, gz / volume
         for column in range(first, last + 1):
             j = column if column < width else column - width
             if j < start or j >= stop:
                 continue
-            cos, sin = cosines[j], sines[j]
-            low, high = -np.inf, np.inf
-            for k in range(3):
-                t = p[k] * cos + q[k] * sin
-                if side[k] > 0:
-                    low = max(low, t)
-                elif side[k] < 0:
-                    high = min(high, t)
-                elif t < 0.0:
-                    low = np.inf
+            low, high = _interval(p, q, side, cosines[j], sines[j])
             if low > high:
                 continue
-            r0, r1 = _rows_between(low, high, tangents, table)
-            base = gx * cos + gy * sin
-            depth, index = nearness[j], seen[j]
-            for r in range(r0, r1 + 1):
+            top, bottom = _rows_between(low, high, tangents, table)
+            base = gx * cosines[j] + gy * sines[j]
+            for r in range(top, bottom + 1):
                 near = base + gz * tangents[r]
-                if near > depth[r]:
-                    depth[r] = near
-                    index[r] = i
+                if near > nearness[j, r]:
+                    nearness[j, r] = near
+                    seen[j, r] = i
 
 
 @numba.njit(cache=True, nogil=True)
