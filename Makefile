@@ -20,7 +20,7 @@ test: $(VENV)/developer  ## all tests
 lint: $(VENV)/developer  ## style, types, and which room may know which
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
+	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
 format: $(VENV)/developer
