@@ -1,7 +1,7 @@
 """The loop: look, scan, turn to the most familiar heading, step."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -78,7 +78,7 @@ class Agent:
     max_steps: int | None = None
     reset_when_lost: bool = False
     seed: int = 0
-    waypoint_spacing: float = field(default=0.1)
+    waypoint_spacing: float = 0.1
 
     def __post_init__(self):
         for name in ("step_length", "arrive", "lost", "patience", "waypoint_spacing"):

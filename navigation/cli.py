@@ -165,7 +165,7 @@ class RunCommand(LearningOptions):
     patience_m: float = 3.0
     """Stuck in a loop after walking this far without getting farther along the route."""
     max_steps: int | None = None
-    """Out of steps after so many. Default: three times the route's length."""
+    """Out of steps after so many. Default: as many as walk the route's length three times."""
     out: Path = Path("run")
     """Folder for the recording, trajectory, summary and picture."""
     overwrite: bool = False

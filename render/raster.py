@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from world.errors import InputError
+from world.files import texture_factor
 from world.scene import World
 
 from .cubemap import Cubemap, Face, face_size_for
@@ -29,7 +30,7 @@ class RasterRenderer:
     """Panoramas through OpenGL (see the module's docstring); a `Renderer`.
 
     backend: "egl" or "osmesa". face_size: edge of a cube face in pixels; None takes what the eye needs.
-    A texture's colour is taken as it is, its alpha ignored: a leaf cut out of a rectangle by alpha shows the rectangle.
+    A texture is drawn in its colours, its alpha ignored: a leaf cut out of a rectangle by alpha shows the rectangle.
     Raises InputError where the backend cannot be had.
     """
 
@@ -150,6 +151,7 @@ def _textured(mesh: Any, double_sided: bool) -> Any:
         positions=mesh.triangles.reshape(-1, 3),
         texcoord_0=visual.uv[mesh.faces].reshape(-1, 2),
         material=pyrender.MetallicRoughnessMaterial(
+            baseColorFactor=(*texture_factor(mesh).tolist(), 1.0),
             # Without a sampler pyrender takes mipmaps with trilinear filtering, repeating.
             baseColorTexture=pyrender.Texture(source=texels, source_channels="RGBA"),
             alphaMode="OPAQUE",

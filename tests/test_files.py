@@ -101,6 +101,16 @@ def test_textures_are_averaged_over_each_triangle_and_kept_for_gl(tmp_path):
         write_world(world, tmp_path / "square.ply")
 
 
+def test_a_materials_factor_tints_its_texture(tmp_path):
+    square = textured_square(np.full((8, 8, 3), 200, np.uint8))
+    square.visual.material.baseColorFactor = [0, 255, 127, 255]
+    square.export(tmp_path / "square.glb")
+    world = read_world(tmp_path / "square.glb")
+    assert np.abs(world.rgb.astype(int) - [0, 200, 100]).max() <= 1
+    write_world(world, tmp_path / "again.glb")
+    assert same(read_world(tmp_path / "again.glb"), world)
+
+
 def test_many_textured_meshes_keep_their_order(tmp_path):
     squares = []
     for i in range(13):

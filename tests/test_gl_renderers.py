@@ -184,6 +184,17 @@ def test_back_faces(backend):
     assert seen == {True: (True, True, True), False: (True, False, True)}
 
 
+def test_a_materials_factor_tints_its_texture(backend):
+    corners, uv = np.array([(1, 1, 0), (1, -1, 0), (1, -1, 1), (1, 1, 1)]), [(0, 0), (1, 0), (1, 1), (0, 1)]
+    image = Image.fromarray(np.full((8, 8, 3), 200, np.uint8))
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=image, baseColorFactor=[0, 255, 127, 255])
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    quad = trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], visual=visual, process=False)
+    world = make_world(quad.triangles, [(0, 200, 100)] * 2, textured=(quad,))
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
+        assert_agree(ours.render([HERE]), cpu.render([HERE]))
+
+
 def test_nothing_but_sky(backend):
     with open_renderer(make_world(ground=None), backend=backend) as ours:
         np.testing.assert_array_equal(ours.render([HERE]), np.full((1, 150, 720, 4), (*SKY, 0)))

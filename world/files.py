@@ -37,6 +37,8 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
     try:
         yield partial
         os.replace(partial, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); give another name") from error
     finally:
         partial.unlink(missing_ok=True)
 
@@ -285,11 +287,21 @@ def _texture(mesh) -> Any:
     return image if image is not None else getattr(material, "image", None)
 
 
+def texture_factor(mesh) -> Float[np.ndarray, "3"]:
+    """What a mesh's texture is multiplied by, 0..1 (glTF's baseColorFactor; 1 where a material has none)."""
+    factor = getattr(mesh.visual.material, "baseColorFactor", None)
+    if factor is None:
+        return np.ones(3)
+    factor = np.asarray(factor)[:3]
+    return factor / 255 if factor.dtype.kind in "ui" else factor.astype(float)
+
+
 def _face_rgb(mesh) -> UInt8[np.ndarray, "n 3"]:
     """One colour a triangle: its own, the mean of its corners', or the mean of its texture over it."""
     image = _texture(mesh)
     if image is not None:
-        return _mean_of_texture(np.asarray(image.convert("RGB")), mesh.visual.uv[mesh.faces].astype(np.float32))
+        mean = _mean_of_texture(np.asarray(image.convert("RGB")), mesh.visual.uv[mesh.faces].astype(np.float32))
+        return np.rint(mean * texture_factor(mesh)).astype(np.uint8)
     if mesh.visual.kind == "texture":
         return np.tile(np.asarray(mesh.visual.material.main_color[:3], dtype=np.uint8), (len(mesh.faces), 1))
     if mesh.visual.kind == "vertex":
