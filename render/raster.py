@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from world.colours import face_rgb, texture_factor, texture_of
 from world.errors import InputError
-from world.files import texture_factor
 from world.scene import World
 
 from .cubemap import Cubemap, Face, face_size_for
@@ -139,17 +139,14 @@ def _textured(mesh: Any, double_sided: bool) -> Any:
     """A trimesh mesh with its texture, or with its colours where it has none, as pyrender draws it."""
     import pyrender
 
-    visual = mesh.visual
-    material = getattr(visual, "material", None)
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is None or visual.uv is None:
-        colour = visual.face_colors if material is None else np.tile(material.main_color, (len(mesh.faces), 1))
-        return _coloured(mesh.triangles, np.asarray(colour)[:, :3].astype(np.uint8), double_sided)
+    image = texture_of(mesh)
+    if image is None:
+        return _coloured(mesh.triangles, face_rgb(mesh), double_sided)
     texels = np.array(image.convert("RGBA"))
     texels[..., 3] = 255  # alpha is how much of a pixel is covered, and a textured triangle covers
     return pyrender.Primitive(
         positions=mesh.triangles.reshape(-1, 3),
-        texcoord_0=visual.uv[mesh.faces].reshape(-1, 2),
+        texcoord_0=mesh.visual.uv[mesh.faces].reshape(-1, 2),
         material=pyrender.MetallicRoughnessMaterial(
             baseColorFactor=(*texture_factor(mesh).tolist(), 1.0),
             # Without a sampler pyrender takes mipmaps with trilinear filtering, repeating.
