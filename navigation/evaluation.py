@@ -70,7 +70,7 @@ def nearest_view(route: Route, positions: Float[np.ndarray, "n 2"]) -> np.ndarra
 
 def heading_errors(
     model: FamiliarityModel, encoding: Encoding, renderer: Renderer, route: Route, positions: Float[np.ndarray, "n 2"],
-    *, scan: float = 2 * np.pi, interpolate: bool = True, progress=lambda done, total: None,
+    *, scan: float = 2 * np.pi, progress=lambda done, total: None,
 ) -> HeadingErrors:  # fmt: skip
     """Let a trained model recover the heading at each position and compare it with the nearest route view's.
 
@@ -85,7 +85,7 @@ def heading_errors(
         views = renderer.render(np.column_stack([positions[part], np.zeros(len(positions[part]))]))
         familiarity = model.scan(encoding(views)).cpu().numpy()
         windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted[part]])
-        headings[part] = best_turn(familiarity, windows, interpolate)
+        headings[part] = best_turn(familiarity, windows)
         progress(min(start + BATCH, len(positions)), len(positions))
     return HeadingErrors(
         positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted))

@@ -28,7 +28,7 @@ from world.files import replacing
 from world.geometry import Route, turn_of_columns
 from world.scene import World
 
-from .agent import Step
+from .agent import ARRIVED, Step
 
 TIMELINE = "step"
 
@@ -92,7 +92,7 @@ class Recording:
         self._log("error/degrees", rr.Scalars(np.degrees(step.error)))
         event = step.reason or (step.reset and f"{step.reset}: put back on the route")
         if event:
-            level = rr.TextLogLevel.INFO if step.reason == "arrived" else rr.TextLogLevel.WARN
+            level = rr.TextLogLevel.INFO if step.reason == ARRIVED else rr.TextLogLevel.WARN
             self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
         self._previous = step
         if time.monotonic() - self._flushed > FLUSH_SECONDS:

@@ -47,9 +47,7 @@ def check_run_folder(
         raise InputError(f"{out} cannot be written: {existing} is read-only; give another --out")
     earlier = _run_files(out)
     if earlier and not overwrite:
-        raise InputError(
-            f"{out} already holds a run ({earlier[0].name}); give another --out, or --overwrite to replace it"
-        )
+        raise _taken(out, earlier[0])
     for path in earlier:
         if any(given.exists() and given.samefile(path) for given in inputs):
             raise InputError(f"{path} is used by this run and would be replaced by it; give another --out")
@@ -64,11 +62,13 @@ def _claim(out: Path, overwrite: bool) -> None:
                 path.unlink()
         (out / RECORDING).open("xb").close()  # fails where another run was quicker
     except FileExistsError:
-        raise InputError(
-            f"{out} already holds a run ({RECORDING}); give another --out, or --overwrite to replace it"
-        ) from None
+        raise _taken(out, out / RECORDING) from None
     except OSError as error:
         raise InputError(f"{out} cannot be written ({error.strerror}); give another --out") from error
+
+
+def _taken(out: Path, path: Path) -> InputError:
+    return InputError(f"{out} already holds a run ({path.name}); give another --out, or --overwrite to replace it")
 
 
 def _run_files(out: Path) -> list[Path]:

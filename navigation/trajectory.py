@@ -45,7 +45,7 @@ class Trajectory:
     def summary(self) -> dict[str, object]:
         """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), resets."""
         deviation = np.array(self.column("deviation_m"))
-        reason = self.rows[-1][-1]
+        reason = self.column("reason")[-1]
         return {
             "arrived": reason == ARRIVED,
             "reason": reason,

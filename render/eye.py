@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from world.errors import InputError
 
-MOST_RAYS = 10**8  # a gigabyte to draw with
+MOST_RAYS = 10**8  # 1.2 GB a thread to draw with
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -51,7 +51,7 @@ class Context:
         try:
             if self._depth == 0:
                 self._make_current()
-        except BaseException:
+        except BaseException:  # whatever it was, also Ctrl-C: the others must not wait for ever
             self._lock.release()
             raise
         self._depth += 1

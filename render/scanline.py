@@ -229,9 +229,8 @@ class ScanlineRenderer:
         self._triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         self._x, self._y = (np.ascontiguousarray(self._triangles[:, :, axis].T) for axis in (0, 1))  # (3, n)
         covered = np.column_stack([rgb, np.full(len(rgb), 255)])
-        self._rgba = np.vstack([covered, [*world.sky_rgb, 0]]).astype(
-            np.uint8
-        )  # what nothing covers is seen as index -1
+        # The sky comes last: what nothing covers is seen as index -1.
+        self._rgba = np.vstack([covered, [*world.sky_rgb, 0]]).astype(np.uint8)
         rays = eye.rays
         self._azimuths = column_azimuths(eye.width * rays)
         elevations = eye.elevations(rays)
@@ -255,8 +254,8 @@ class ScanlineRenderer:
             edges = np.linspace(0, self.eye.width, self._threads + 1).astype(int)
             jobs = [(poses, views, int(a), int(b)) for a, b in pairwise(edges) if a < b]
         else:
-            shares = np.array_split(np.arange(len(poses)), self._threads)
-            jobs = [(poses[s[0] : s[-1] + 1], views[s[0] : s[-1] + 1], 0, self.eye.width) for s in shares if len(s)]
+            shares = zip(np.array_split(poses, self._threads), np.array_split(views, self._threads), strict=True)
+            jobs = [(at, share, 0, self.eye.width) for at, share in shares if len(at)]
         others = [self._pool.submit(self._render_strip, *job) for job in jobs[1:]]
         self._render_strip(*jobs[0])
         for other in others:

@@ -3,11 +3,16 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from jaxtyping import install_import_hook
 
 # All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
 CHECKED = ["world", "render.eye", "render.renderer", "render.cubemap", "render.raster", "navigation"]
 install_import_hook(CHECKED, "typecheck.check")
+
+# No test asserts a time, those of hypothesis included.
+settings.register_profile("no deadline", settings(), deadline=None)
+settings.load_profile("no deadline")
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 

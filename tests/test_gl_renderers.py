@@ -26,7 +26,6 @@ from world.files import read_world
 from world.geometry import Bounds, Pose, turn_of_columns
 from world.scene import Ground, World
 
-SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 BACKENDS = ("egl", "osmesa")
 SKY, SAND = (191, 191, 191), (229, 183, 90)
 HERE = Pose(0.0, 0.0, 0.3)
@@ -48,10 +47,8 @@ def backend(request):
 
 
 @pytest.fixture(scope="module")
-def sussex():
-    if not SUSSEX.is_dir():
-        pytest.skip(f"the Sussex world is not in {SUSSEX}")
-    return read_world(SUSSEX / "world5000_gray.bin")
+def sussex_world(sussex):
+    return read_world(sussex / "world5000_gray.bin")
 
 
 def make_world(triangles=(), rgb=(), **kwargs) -> World:
@@ -105,9 +102,9 @@ def test_agrees_with_the_exact_renderer(backend, garden):
     assert {tuple(pixel) for pixel in views.reshape(-1, 4).tolist()} <= palette  # no light, gamma or mixture
 
 
-def test_agrees_in_the_sussex_world(backend, sussex):
+def test_agrees_in_the_sussex_world(backend, sussex_world):
     poses = np.array([(5, 5, 0.0), (6.3, 8.45, 2.0), (2.5, 7.5, -1.0)])
-    with open_renderer(sussex, backend=backend) as ours, open_renderer(sussex, backend="cpu") as cpu:
+    with open_renderer(sussex_world, backend=backend) as ours, open_renderer(sussex_world, backend="cpu") as cpu:
         assert_agree(ours.render(poses), cpu.render(poses))
 
 
@@ -128,19 +125,19 @@ def test_agrees_in_generated_worlds(backend, preset):
         assert_agree(ours.render(poses), cpu.render(poses), share=0.02)
 
 
-def test_culled_sussex_frames(backend, sussex):
+def test_culled_sussex_frames(backend, sussex, sussex_world):
     """The frames were drawn by an independent renderer, itself 0.35 to 1.4 grey levels from exact; twice a cube's error at most."""
-    world = replace(sussex, double_sided=False)
-    for entry in json.loads((SUSSEX / "frames" / "poses.json").read_text())["views"]:
-        frame = cv2.imread(str(SUSSEX / "frames" / entry["file"]))[..., ::-1]
+    world = replace(sussex_world, double_sided=False)
+    for entry in json.loads((sussex / "frames" / "poses.json").read_text())["views"]:
+        frame = cv2.imread(str(sussex / "frames" / entry["file"]))[..., ::-1]
         with open_renderer(world, Eye(z=entry["z_m"]), backend) as ours:
             view = ours.render([Pose(entry["x_m"], entry["y_m"], np.radians(entry["heading_deg"]))])[0]
         assert np.abs(view[..., :3].astype(int) - frame).mean() < 2.6
 
 
-def test_low_resolution_is_averaged(backend, sussex):
+def test_low_resolution_is_averaged(backend, sussex_world):
     eye, poses = Eye(width=120, height=25), np.array([(5, 5, 0.0), (2.5, 7.5, -1.0)])
-    with open_renderer(sussex, eye, backend) as ours, open_renderer(sussex, eye, "cpu") as cpu:
+    with open_renderer(sussex_world, eye, backend) as ours, open_renderer(sussex_world, eye, "cpu") as cpu:
         views, exact = ours.render(poses), cpu.render(poses)
     assert difference(views, exact).mean() < 2.5
     assert np.abs(views.mean(axis=(0, 1, 2)) - exact.mean(axis=(0, 1, 2))).max() < 0.5
@@ -233,10 +230,10 @@ def test_a_textured_quad(backend, pbr):
     assert not (view == (1, 2, 3, 255)).all(-1).any()
 
 
-def test_several_at_once(backend, garden, sussex):
+def test_several_at_once(backend, garden, sussex_world):
     with open_renderer(garden, backend=backend) as first:
         before = first.render([HERE])
-        with open_renderer(sussex, Eye(width=90, height=20), backend) as second:
+        with open_renderer(sussex_world, Eye(width=90, height=20), backend) as second:
             between = second.render([Pose(5, 5, 0)])
             np.testing.assert_array_equal(first.render([HERE]), before)
             np.testing.assert_array_equal(second.render([Pose(5, 5, 0)]), between)

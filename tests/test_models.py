@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from jaxtyping import TypeCheckError
 from sklearn.neural_network import MLPClassifier
@@ -92,7 +92,6 @@ def test_unknown_models_are_refused_with_the_known_ones():
         make_model("perfect-memry")
 
 
-@settings(deadline=None)
 @given(st.integers(1, 8), st.integers(1, 3), st.integers(1, 6), st.integers(4, 20), st.integers(0, 999))
 def test_perfect_memory_is_equation_1_at_every_rotation(m, n, h, w, seed):
     snapshots, queries = views(m, seed, h, w), views(n, seed + 1, h, w)

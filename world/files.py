@@ -102,27 +102,29 @@ def write_world(world: World, path: str | os.PathLike) -> None:
         raise InputError(f"{path}: a world is written as .glb or .ply, not {suffix or 'a name without an ending'!r}")
     if suffix == ".ply" and world.textured:
         raise InputError(f"{path}: a .ply cannot hold this world's textures; write it as .glb")
-    n = len(world.triangles)
-    if n == 0:
+    if len(world.triangles) == 0:
         raise InputError(f"{path}: this world holds no triangles; there is nothing to write")
-    rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
-    mesh = trimesh.Trimesh(
-        world.triangles.reshape(-1, 3),
-        np.arange(3 * n).reshape(n, 3),
-        vertex_colors=np.repeat(rgba, 3, axis=0),
-        process=False,
-    )
     if suffix == ".glb":
-        meshes = world.textured or (mesh,)
+        meshes = world.textured or (_as_mesh(world),)
         scene = trimesh.Scene({f"{i:06d}": mesh for i, mesh in enumerate(meshes)})
         scene.metadata[KEY] = _to_json(world)
         data = bytes(scene.export(file_type="glb"))  # type: ignore[arg-type]
     else:
-        data = bytes(mesh.export(file_type="ply"))  # type: ignore[arg-type]
+        data = bytes(_as_mesh(world).export(file_type="ply"))  # type: ignore[arg-type]
         head, first_element, rest = data.partition(b"element vertex")
         data = head + f"comment {KEY} {json.dumps(_to_json(world))}\n".encode("ascii") + first_element + rest
     with replacing(path) as partial:
         partial.write_bytes(data)
+
+
+def _as_mesh(world: World) -> Any:
+    """The world's triangles as a trimesh mesh that shares no corners, each corner in its triangle's colour."""
+    import trimesh
+
+    n = len(world.triangles)
+    rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
+    corners, faces = world.triangles.reshape(-1, 3), np.arange(3 * n).reshape(n, 3)
+    return trimesh.Trimesh(corners, faces, vertex_colors=np.repeat(rgba, 3, axis=0), process=False)
 
 
 def read_route(path: str | os.PathLike) -> Route:

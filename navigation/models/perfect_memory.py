@@ -6,7 +6,7 @@ from jaxtyping import Float32, Int64
 from ..familiarity import Images, check_scan, check_training
 from ..rotation import FilterBank, rotations
 
-# float32 correlations of images with norms a and b are off by less than this times a b (measured: under 1e-6).
+# float32 correlations of images with norms a and b are off by less than this times a b (measured: 1.4e-7).
 ROUNDING = 4e-6
 
 
