@@ -11,7 +11,22 @@ if TYPE_CHECKING:
     from .encoding import Encoding
     from .evaluation import grid_positions, heading_errors
     from .familiarity import FamiliarityModel
-    from .models import MLP, PerfectMemory, VisualCompass, make_model
+    from .model_files import load_model, save_model
+    from .models import (
+        MLP,
+        RBM,
+        AdaBoost,
+        Autoencoder,
+        Chain,
+        Infomax,
+        MLPMixture,
+        MLPRotation,
+        MushroomBody,
+        PerfectMemory,
+        VisualCompass,
+        make_model,
+        opponent,
+    )
     from .recording import Recording
     from .runs import record_walk
     from .training import learn, training_poses
@@ -19,9 +34,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MLP",
+    "RBM",
+    "AdaBoost",
     "Agent",
+    "Autoencoder",
+    "Chain",
     "Encoding",
     "FamiliarityModel",
+    "Infomax",
+    "MLPMixture",
+    "MLPRotation",
+    "MushroomBody",
     "PerfectMemory",
     "Recording",
     "Step",
@@ -30,8 +53,11 @@ __all__ = [
     "grid_positions",
     "heading_errors",
     "learn",
+    "load_model",
     "make_model",
+    "opponent",
     "record_walk",
+    "save_model",
     "training_poses",
 ]
 
@@ -40,7 +66,22 @@ _HOMES = {
     "encoding": ("Encoding",),
     "evaluation": ("grid_positions", "heading_errors"),
     "familiarity": ("FamiliarityModel",),
-    "models": ("MLP", "PerfectMemory", "VisualCompass", "make_model"),
+    "models": (
+        "MLP",
+        "RBM",
+        "AdaBoost",
+        "Autoencoder",
+        "Chain",
+        "Infomax",
+        "MLPMixture",
+        "MLPRotation",
+        "MushroomBody",
+        "PerfectMemory",
+        "VisualCompass",
+        "make_model",
+        "opponent",
+    ),
+    "model_files": ("load_model", "save_model"),
     "recording": ("Recording",),
     "runs": ("record_walk",),
     "training": ("learn", "training_poses"),

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from jaxtyping import Float, UInt8
 
 from render.renderer import Renderer
@@ -11,7 +12,7 @@ from world.errors import InputError
 from world.geometry import Pose, Route, wrap_angle
 
 from .encoding import Encoding
-from .familiarity import FamiliarityModel, SnapshotModel
+from .familiarity import FamiliarityModel, Following, SequenceModel, SnapshotModel
 from .rotation import best_turn, scan_window
 
 # Why a walk ends. The first is success.
@@ -31,6 +32,7 @@ class Step:
     index: 0 for the first look. pose: where the agent stands and faces as it looks. view: what it sees, RGBA.
     familiarity: of every rotation, turned left by 0, 1, .. columns. turn: chosen, noise included (rad, left positive).
     match: index of the learned view it recognised, None where the model keeps none.
+    place: share of the learned sequence, 0 to 1, that the model believes to have walked; None where it does not know.
     deviation: distance from the route (m). along: how far along the route the nearest place is (m).
     error: how far the chosen heading is from the route's there (rad, -pi..pi).
     reason: None while the walk goes on, else why it ends. reset: why the agent was put back on the route before this look, or None.
@@ -42,6 +44,7 @@ class Step:
     familiarity: Float[np.ndarray, " w"]
     turn: float
     match: int | None
+    place: float | None
     deviation: float
     along: float
     error: float
@@ -112,10 +115,13 @@ class Agent:
         random = np.random.default_rng(self.seed)
         pose, reset, furthest, gained_at = start, None, -np.inf, 0
         been_away = self._from_goal(self.route.start) > self.arrive  # else the route ends where it starts
+        following = self.model.follow() if isinstance(self.model, SequenceModel) else None
         for index in range(self.step_limit + 1):
             view = self.renderer.render([pose])[0]
-            familiarity, match = self._scan(view, pose)
-            turn = match_turn = float(best_turn(familiarity[None], self._window(len(familiarity), pose))[0])
+            features = self.encoding(view[None])
+            window = self._window(features.shape[2], pose)
+            familiarity, match = self._scan(features, window, following)
+            turn = match_turn = float(best_turn(familiarity[None], window)[0])
             turn = float(wrap_angle(turn + self.heading_noise * random.standard_normal()))
             (deviation,), (along,) = self.route.nearest(np.array([pose[:2]]))
             if along > furthest:
@@ -126,6 +132,7 @@ class Agent:
             yield Step(
                 index=index, pose=pose, view=view, familiarity=familiarity, turn=turn,
                 match=None if match is None else int(match[round(match_turn / (2 * np.pi) * len(match)) % len(match)]),
+                place=None if following is None else following.place,
                 deviation=float(deviation), along=float(along), reset=reset, reason=None if recovering else reason,
                 error=float(wrap_angle(pose.heading + turn - self.route.at(along)[0, 2])),
             )  # fmt: skip
@@ -137,9 +144,13 @@ class Agent:
             else:
                 pose, reset = pose.turned(turn).moved(self.step_length), None
 
-    def _scan(self, view: np.ndarray, pose: Pose) -> tuple[np.ndarray, np.ndarray | None]:
+    def _scan(
+        self, features: torch.Tensor, window: np.ndarray, following: Following | None
+    ) -> tuple[np.ndarray, np.ndarray | None]:
         """Familiarity of every rotation of a view, and which learned view each resembles, if the model knows."""
-        features = self.encoding(view[None])
+        if following is not None:
+            familiarity, match = following.look(features[0], window)
+            return familiarity.cpu().numpy(), match.cpu().numpy()
         if isinstance(self.model, SnapshotModel):
             familiarity, match = self.model.match(features)
             return familiarity[0].cpu().numpy(), match[0].cpu().numpy()

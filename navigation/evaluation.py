@@ -10,7 +10,7 @@ from world.errors import InputError
 from world.geometry import Bounds, Route, wrap_angle
 
 from .encoding import Encoding
-from .familiarity import FamiliarityModel
+from .familiarity import FamiliarityModel, Images
 from .rotation import best_turn, scan_window
 
 BATCH = 64  # views rendered, encoded and scored at once
@@ -68,6 +68,20 @@ def nearest_view(route: Route, positions: Float[np.ndarray, "n 2"]) -> np.ndarra
     return np.hypot(*(positions[:, None] - route.xy).transpose(2, 0, 1)).argmin(axis=1)
 
 
+def views_east(encoding: Encoding, renderer: Renderer, positions: Float[np.ndarray, "n 2"]) -> Images:
+    """What is seen at each position, encoded. All face east, so that the answer is not on the grid of rotations by construction."""
+    return encoding(renderer.render(np.column_stack([positions, np.zeros(len(positions))])))
+
+
+def recovered_headings(
+    model: FamiliarityModel, views: Images, wanted: Float[np.ndarray, " n"], scan: float = 2 * np.pi
+) -> Float[np.ndarray, " n"]:
+    """The most familiar headings (rad) at places whose views face east; a scan under 2 pi wide is centred on the wanted ones."""
+    familiarity = model.scan(views).cpu().numpy()
+    windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted])
+    return best_turn(familiarity, windows)
+
+
 def heading_errors(
     model: FamiliarityModel, encoding: Encoding, renderer: Renderer, route: Route, positions: Float[np.ndarray, "n 2"],
     *, scan: float = 2 * np.pi, progress=lambda done, total: None,
@@ -81,11 +95,7 @@ def heading_errors(
     headings = np.empty(len(positions))
     for start in range(0, len(positions), BATCH):
         part = slice(start, start + BATCH)
-        # All views face east, so that the answer is not on the grid of rotations by construction.
-        views = renderer.render(np.column_stack([positions[part], np.zeros(len(positions[part]))]))
-        familiarity = model.scan(encoding(views)).cpu().numpy()
-        windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted[part]])
-        headings[part] = best_turn(familiarity, windows)
+        headings[part] = recovered_headings(model, views_east(encoding, renderer, positions[part]), wanted[part], scan)
         progress(min(start + BATCH, len(positions)), len(positions))
     return HeadingErrors(
         positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted))

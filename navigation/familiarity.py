@@ -1,27 +1,36 @@
-"""What a familiarity model is."""
+"""What a familiarity model is, and what those here share."""
 
-from typing import Protocol, runtime_checkable
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
+import numpy as np
 import torch
-from jaxtyping import Float32, Int64
+from jaxtyping import Bool, Float32, Int64
 
 from world.errors import InputError
 
 Images = Float32[torch.Tensor, "n h w"]
+Scans = Float32[torch.Tensor, "n w"]
+Learned = dict[str, torch.Tensor]
+Self = TypeVar("Self", bound="Model")
 
 
 @runtime_checkable
 class FamiliarityModel(Protocol):
     """Learns the views of a route and scores other views by how familiar they are at every rotation.
 
-    Views are feature images (n, h, w) as an `Encoding` makes them; for training they face along the route.
+    Views are feature images (n, h, w) as an `Encoding` makes them; for training they face along the route. Views of several
+    routes are learned one route after the other.
     """
 
     def fit(self, views: Images) -> "FamiliarityModel":
         """Learn the views (forgetting earlier ones). Raises InputError for none, or for values that are not finite."""
         ...
 
-    def scan(self, views: Images) -> Float32[torch.Tensor, "n w"]:
+    def scan(self, views: Images) -> Scans:
         """Familiarity, higher is more familiar, of each view turned left by 0, 1, .. w - 1 columns.
 
         Raises InputError before `fit`, and for views of another size than the learned ones.
@@ -33,9 +42,185 @@ class FamiliarityModel(Protocol):
 class SnapshotModel(FamiliarityModel, Protocol):
     """A model that keeps views and so can say which of them was recognised."""
 
-    def match(self, views: Images) -> tuple[Float32[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
+    def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and the index of the learned view that each rotation resembles most."""
         ...
+
+
+@runtime_checkable
+class ViewByView(FamiliarityModel, Protocol):
+    """A model that can go on learning."""
+
+    def partial_fit(self, views: Images) -> "ViewByView":
+        """Learn further views of the same shape on top of what it knows; where that fails, it knows what it knew."""
+        ...
+
+
+@runtime_checkable
+class Following(Protocol):
+    """One walk along what a `SequenceModel` learned, which remembers where it has come to."""
+
+    @property
+    def place(self) -> float | None:
+        """Share of the learned sequence, 0 to 1, that it believes to have walked; None while it does not know."""
+        ...
+
+    def look(
+        self, view: Float32[torch.Tensor, "h w"], allowed: Bool[np.ndarray, " w"]
+    ) -> tuple[Float32[torch.Tensor, " w"], Int64[torch.Tensor, " w"]]:
+        """Familiarity of each rotation and the learned view it resembles, going by where the walk is; of the `allowed`
+        rotations the best becomes where it is.
+        """
+        ...
+
+
+@runtime_checkable
+class SequenceModel(SnapshotModel, Protocol):
+    """A model whose familiarity depends on where along the route a walk has come to."""
+
+    def follow(self) -> Following:
+        """Begin a walk, not knowing yet where."""
+        ...
+
+
+@dataclass(kw_only=True, eq=False)
+class Model(ABC):
+    """A model by its name: parameters are the fields, and what training leaves behind is `learned`, nothing else.
+
+    device: where it learns and scans, as torch names devices ("cpu", "cuda"). seed: of everything it draws.
+    learned: named tensors; they and the parameters are what a model file holds. shape: (h, w) of the views it learned, or None.
+    """
+
+    name = ""  # each class has its own
+    paper = ""
+    CHOICES: ClassVar[dict[str, Collection[str]]] = {}  # of parameters that are names
+    LIMITS: ClassVar[
+        dict[str, tuple[float, float]]
+    ] = {}  # of numbers, both ends allowed, where they are not the usual ones
+
+    device: str = "cpu"
+    seed: int = 0
+    learned: Learned = field(init=False, repr=False, default_factory=dict)
+    shape: tuple[int, int] | None = field(init=False, repr=False, default=None)
+
+    def fit(self: Self, views: Images) -> Self:
+        """Learn the views, forgetting earlier ones. Raises InputError for no views and for values that are not finite."""
+        self.check_parameters()
+        check_training(views)
+        views = self._here(views)
+        self.restore((views.shape[1], views.shape[2]), self._learn(views))
+        return self
+
+    def scan(self, views: Images) -> Scans:
+        """Familiarity of each rotation, higher is more familiar. Raises InputError before `fit` and for views of another shape."""
+        check_scan(views, self.shape)
+        if len(views) == 0:
+            return torch.empty(0, views.shape[2])
+        return self._scan(self._here(views))
+
+    def restore(self, shape: tuple[int, int], learned: Learned) -> None:
+        """Take over what was learned, from training or from a file. Raises InputError for tensors that cannot be this model's."""
+        self._check_fit(shape, learned)
+        self.learned = {key: self._here(tensor) for key, tensor in learned.items()}
+        self.shape = shape
+        self._prepare()
+
+    def check_parameters(self) -> None:
+        """Raise InputError for parameters that mean nothing.
+
+        Names are among CHOICES, numbers within LIMITS: by default fractions are at least 0, counts at least 1. Of several numbers,
+        there is at least one; counts among them are counts, fractions anything finite.
+        """
+        for key, value in self.parameters.items():
+            several = isinstance(value, (tuple, list))
+            for each in value if several else [value]:
+                if key in self.CHOICES and isinstance(each, str) and each not in self.CHOICES[key]:
+                    raise InputError(f"{self.name}: {key} {each!r}; give one of {', '.join(self.CHOICES[key])}")
+                if isinstance(each, (int, float)):
+                    usual = (-np.inf if several else 0, np.inf) if isinstance(each, float) else (1, np.inf)
+                    low, high = self.LIMITS.get(key, (0, 2**62) if key == "seed" else usual)
+                    if not (np.isfinite(each) and low <= each <= high):
+                        raise InputError(f"{self.name}: {key} {value}; give numbers from {low:g} to {high:g}")
+                elif not (isinstance(each, str) and (key in self.CHOICES or key == "device")) and each is not None:
+                    raise InputError(f"{self.name}: {key} {value!r}; give a number")
+            if several and not value:
+                raise InputError(f"{self.name}: {key} is empty; give at least one")
+
+    @property
+    def memory_bytes(self) -> int:
+        """Size of what it has learned."""
+        return sum(tensor.nbytes for tensor in self.learned.values())
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What it was made with, by name."""
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}
+
+    def _here(self, tensor: torch.Tensor) -> torch.Tensor:
+        """The tensor on this model's device. Raises InputError where there is no such device."""
+        try:
+            return tensor.to(self.device)
+        except (RuntimeError, AssertionError, NotImplementedError) as error:
+            raise InputError(f"device {self.device!r} cannot be used here ({str(error).splitlines()[0]})") from error
+
+    def _check_fit(self, shape: tuple[int, int], learned: Learned) -> None:
+        expected = self._shapes(*shape)
+        if learned.keys() != expected.keys():
+            raise InputError(f"{self.name}: it learns {', '.join(expected)}, not {', '.join(learned) or 'nothing'}")
+        for key, tensor in learned.items():
+            fits = len(tensor.shape) == len(expected[key]) and all(
+                want in (None, size) for want, size in zip(expected[key], tensor.shape, strict=True)
+            )
+            if not fits:
+                raise InputError(f"{self.name}: {key} of shape {tuple(tensor.shape)}, not {expected[key]}")
+            if not torch.isfinite(tensor).all():
+                raise InputError(
+                    f"{self.name}: the {key} are not finite; if they grew without bound, give a lower rate"
+                )
+
+    def _random(self) -> torch.Generator:
+        """A generator at the beginning of this model's draws. On the CPU, so that every device draws the same."""
+        return torch.Generator().manual_seed(self.seed)
+
+    @abstractmethod
+    def _learn(self, views: Images) -> Learned:
+        """What remains of the views."""
+
+    @abstractmethod
+    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+        """Names and shapes of what it learns from views of height x width; None where the size varies."""
+
+    @abstractmethod
+    def _scan(self, views: Images) -> Scans:
+        """Familiarity of each rotation of views that were checked."""
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Derive from `learned` what scanning needs."""
+
+
+class IncrementalModel(Model):
+    """A model that learns view by view, and goes on learning at any time."""
+
+    def partial_fit(self, views: Images) -> "IncrementalModel":
+        """Learn further views of the same shape on top of what it knows; where that fails, it knows what it knew."""
+        if self.shape is None:
+            return self.fit(views)
+        check_training(views)
+        check_scan(views, self.shape)
+        self.restore(self.shape, self._add(self.learned, self._here(views)))
+        return self
+
+    def _learn(self, views: Images) -> Learned:
+        return self._add(self._begin(views.shape[1], views.shape[2]), views)
+
+    @abstractmethod
+    def _begin(self, height: int, width: int) -> Learned:
+        """What it knows before the first view."""
+
+    @abstractmethod
+    def _add(self, learned: Learned, views: Images) -> Learned:
+        """`learned`, which stays as it is, with views added one after the other."""
 
 
 def check_training(views: Images) -> None:

@@ -15,16 +15,19 @@ from .terminal import progress, say
 if TYPE_CHECKING:
     import numpy as np
 
+    from render.eye import Eye
     from render.renderer import Renderer
     from world.geometry import Route
     from world.scene import World
 
     from .encoding import Encoding
-    from .familiarity import FamiliarityModel
+    from .familiarity import Model
 
 WORLD = (
     "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
 )
+
+FILE_SUFFIX = ".safetensors"  # of trained models
 
 
 @dataclass
@@ -34,8 +37,8 @@ class SightOptions:
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
     seed: int = 0
     """Seed of everything random: the world and route where they are generated, the model's start, the heading noise."""
-    size: str = "720x150"
-    """Columns x rows of a panorama. A pixel wider than a degree is averaged from several rays."""
+    size: str | None = None
+    """Columns x rows of a panorama; a pixel wider than a degree is averaged from several rays. Default: 720x150, or the model file's."""
     renderer: str = "auto"
     """auto (the fastest here), cpu, egl or osmesa."""
     samples: int | None = None
@@ -64,32 +67,35 @@ class SightOptions:
 
     def width_and_height(self) -> tuple[int, int]:
         """Columns and rows of a panorama."""
-        width, cross, height = self.size.lower().partition("x")
+        width, cross, height = (self.size or "720x150").lower().partition("x")
         if not (cross and width.isdecimal() and height.isdecimal()):
             raise InputError(f"size {self.size!r}: give columns x rows, for example 720x150")
         return int(width), int(height)
 
-    def open_renderer(self, world):
-        from render import Eye, open_renderer
+    def eye(self) -> "Eye":
+        """The eye that these flags describe."""
+        from render import Eye
 
         width, height = self.width_and_height()
-        eye = Eye(
+        return Eye(
             width=width, height=height, top=math.radians(self.top_deg), bottom=math.radians(self.bottom_deg),
             z=self.eye_height_m, samples=self.samples,
         )  # fmt: skip
-        return open_renderer(world, eye, self.renderer)
+
+    def open_renderer(self, world):
+        from render import open_renderer
+
+        return open_renderer(world, self.eye(), self.renderer)
 
 
 @dataclass
-class LearningOptions(SightOptions):
-    """What is learned, and from which views."""
+class RouteOptions(SightOptions):
+    """Along which route views are learned, and what is kept of them."""
 
     route: Path | None = None
     """A route file (.csv or AntWorld .bin); without it a route of about 8 m is generated."""
-    model: str = "perfect-memory"
-    """visual-compass, perfect-memory or mlp."""
-    encoding: str = "edges"
-    """edges, grey or sky; or a chain of steps, such as 'sky-mask | vertical-edges | resize 6 | normalise'."""
+    encoding: str | None = None
+    """edges (the default), grey or sky; or a chain of steps, such as 'sky-mask | vertical-edges | resize 6 | normalise'."""
     resize: float | None = None
     """Factor by which a view's width and height are reduced. Default: whatever brings the width down to 120."""
     blur: float = 0.0
@@ -100,21 +106,22 @@ class LearningOptions(SightOptions):
     """Learn one route view in so many."""
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
+    device: str = "cpu"
+    """Where the model learns and scans: cpu, cuda, or another device of torch's."""
 
-    def prepare(self) -> "Lesson":
-        """Everything that a model is to learn, and everything that can be refused before long work begins."""
+    def chosen_encoding(self) -> "Encoding":
+        """The encoding that these flags spell."""
+        from .encoding import Encoding
+
+        name = self.encoding or "edges"
+        automatic = 1.0 if "|" in name else max(1.0, self.width_and_height()[0] / 120)
+        return Encoding.named(name, resize=automatic if self.resize is None else self.resize, blur=self.blur)
+
+    def open_route(self) -> tuple["World", "Route"]:
+        """The world, and the route through it."""
         from world.files import read_route
         from world.walk import generate_route
 
-        from .encoding import Encoding
-        from .models import make_model
-        from .training import training_poses
-
-        model = make_model(self.model, self.seed)
-        automatic = 1.0 if "|" in self.encoding else max(1.0, self.width_and_height()[0] / 120)
-        encoding = Encoding.named(
-            self.encoding, resize=automatic if self.resize is None else self.resize, blur=self.blur
-        )
         route = read_route(self.route) if self.route else None
         world = self.open_world()
         route = route or generate_route(world, self.seed)
@@ -124,9 +131,59 @@ class LearningOptions(SightOptions):
             raise InputError(
                 f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
             )
+        return world, route
+
+
+@dataclass
+class LearningOptions(RouteOptions):
+    """What learns."""
+
+    model: str = "perfect-memory"
+    """A model's name (see tussock models), or a file that tussock train wrote: it knows its views, encoding and size."""
+
+    def prepare(self) -> "Lesson":
+        """Everything that a model is to learn, and everything that can be refused before long work begins."""
+        from .models import make_model
+        from .training import training_poses
+
+        if self.model.endswith(FILE_SUFFIX):
+            model, encoding, known = self._open_model()
+        else:
+            model, encoding, known = (
+                make_model(self.model, seed=self.seed, device=self.device),
+                self.chosen_encoding(),
+                None,
+            )
+        world, route = self.open_route()
         views = route.resampled(self.spacing_m)
         poses = training_poses(views, every=self.every, learning_walk=self.learning_walk_m, field=world.field)
-        return Lesson(world=world, route=route, route_views=views, poses=poses, encoding=encoding, model=model)
+        return Lesson(
+            world=world, route=route, route_views=views, poses=poses, encoding=encoding, model=model, known=known
+        )
+
+    def _open_model(self) -> tuple["Model", "Encoding", "np.ndarray"]:
+        """A model from a file, its encoding, and the poses of the views it knows. Refuses flags that say otherwise."""
+        import numpy as np
+
+        from .model_files import load_model
+
+        saved = load_model(self.model, device=self.device)
+        if saved.eye is not None:
+            if self.size is None:
+                self.size = f"{saved.eye.width}x{saved.eye.height}"
+            if self.eye() != saved.eye:
+                raise InputError(
+                    f"{self.model} learned through another eye ({saved.eye}) than the flags ask for ({self.eye()}); "
+                    "give the same --size, --samples, --eye-height-m, --top-deg and --bottom-deg, or none"
+                )
+        unsaid = self.encoding is None and self.resize is None and self.blur == 0
+        encoding = saved.encoding if unsaid and saved.encoding is not None else self.chosen_encoding()
+        if saved.encoding is not None and encoding != saved.encoding:
+            raise InputError(
+                f"{self.model} learned views encoded as {str(saved.encoding)!r}, the flags ask for {str(encoding)!r}; "
+                "leave out --encoding, --resize and --blur"
+            )
+        return saved.model, encoding, np.empty((0, 3)) if saved.poses is None else saved.poses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,6 +191,7 @@ class Lesson:
     """A world, a route through it, and what is to be learned there.
 
     route_views: the route's poses at the spacing of its views. poses: (n, 3) all that views are learned from.
+    known: poses (m, 3) of the views the model knows already, because it comes from a file; None if it has yet to learn.
     """
 
     world: "World"
@@ -141,12 +199,15 @@ class Lesson:
     route_views: "Route"
     poses: "np.ndarray"
     encoding: "Encoding"
-    model: "FamiliarityModel"
+    model: "Model"
+    known: "np.ndarray | None"
 
     def teach(self, renderer: "Renderer") -> "np.ndarray":
-        """Train the model, showing progress; return the poses whose views it learned."""
+        """Train the model, showing progress, unless it comes from a file; return the poses of the views it knows."""
         from .training import learn
 
         say(f"renderer: {renderer.backend}")
+        if self.known is not None:
+            return self.known
         with progress("learning", "views") as report:
             return learn(self.model, self.encoding, renderer, self.poses, report)

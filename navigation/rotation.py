@@ -34,13 +34,16 @@ class FilterBank:
     def __len__(self) -> int:
         return self.spectra.shape[2]
 
-    def chunks(self, views: Float32[torch.Tensor, "n h w"]) -> Iterator[tuple[slice, Float32[torch.Tensor, "n m w"]]]:
-        """Responses of views to consecutive slices of the filters, no more than CHUNK_BYTES of them at once."""
+    def chunks(
+        self, views: Float32[torch.Tensor, "n h w"], among: slice | None = None
+    ) -> Iterator[tuple[slice, Float32[torch.Tensor, "n m w"]]]:
+        """Responses of views to consecutive slices of the filters (those `among`), no more than CHUNK_BYTES of them at once."""
         width = self.shape[1]
         conjugates = torch.fft.rfft(views).conj().permute(2, 0, 1).resolve_conj()  # (f, n, h)
         at_once = max(1, CHUNK_BYTES // (8 * width * max(1, len(views))))
-        for start in range(0, len(self), at_once):
-            part = slice(start, min(start + at_once, len(self)))
+        first, last, _ = (among or slice(None)).indices(len(self))
+        for start in range(first, last, at_once):
+            part = slice(start, min(start + at_once, last))
             product = torch.bmm(conjugates, self.spectra[:, :, part])  # (f, n, m)
             yield part, torch.fft.irfft(product.permute(1, 2, 0), n=width)
 
@@ -57,6 +60,20 @@ def rotations(view: Float32[torch.Tensor, "h w"], turns: torch.Tensor) -> Float3
     width = view.shape[-1]
     columns = (torch.arange(width, device=view.device) - turns[:, None]) % width  # (k, w)
     return view[:, columns].movedim(0, 1)
+
+
+def bell(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:
+    """A Gaussian over the rotations about rotation 0, of sum 1; deviation: its standard deviation (rad), over 0."""
+    turns = torch.as_tensor(turn_of_columns(np.arange(width), width), dtype=torch.float32)
+    return torch.softmax(-0.5 * (turns / deviation) ** 2, dim=0)
+
+
+def smoothed(scans: Float32[torch.Tensor, "n w"], deviation: float) -> Float32[torch.Tensor, "n w"]:
+    """Each rotation averaged with its neighbours, by a Gaussian with a standard deviation of `deviation` (rad); 0 is as it is."""
+    if deviation == 0:
+        return scans
+    weights = bell(scans.shape[1], deviation).to(scans.device)
+    return torch.fft.irfft(torch.fft.rfft(scans) * torch.fft.rfft(weights), n=scans.shape[1])
 
 
 def scan_window(width: int, angle: float, centre: float = 0.0) -> Bool[np.ndarray, " width"]:

@@ -28,7 +28,35 @@ def progress(what: str, unit: str) -> Iterator[Callable[[int, int], object]]:
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print a result for people: a line a value."""
+    """Print a result for people: a line a value, and a table where a value is rows of further values."""
     width = max(map(len, result))
     for key, value in result.items():
-        print(f"{key:<{width}}  {f'{value:.4g}' if isinstance(value, float) else value}")
+        if isinstance(value, dict):
+            show_table(key, value)
+        else:
+            print(f"{key:<{width}}  {text(value)}")
+
+
+def show_table(name: str, rows: dict[str, dict[str, Any]]) -> None:
+    """Print rows by their names; all have the same columns."""
+    from rich.console import Console
+    from rich.table import Table
+
+    columns = next(iter(rows.values()))
+    table = Table(
+        name, *(column.replace("_", " ") for column in columns), box=None, pad_edge=False, header_style="bold"
+    )
+    for key, row in rows.items():
+        table.add_row(key, *map(text, row.values()))
+    # Where nobody looks, as in a pipe, a line a row however long.
+    console = Console()
+    Console(width=console.width if console.is_terminal else 200).print(table)
+
+
+def text(value: Any) -> str:
+    """A value as people read it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}" if value >= 10_000 else str(value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

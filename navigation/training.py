@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from render.renderer import Renderer
 from world.errors import InputError
@@ -52,11 +52,11 @@ def training_poses(
     return every_pose
 
 
-def learn(
-    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"],
+def training_views(
+    encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"],
     progress: Callable[[int, int], object] = lambda done, total: None,
-) -> Float[np.ndarray, "m 3"]:  # fmt: skip
-    """Fit the model to the views at poses; return the poses whose views it learned.
+) -> tuple[Float32[torch.Tensor, "m h w"], Float[np.ndarray, "m 3"]]:  # fmt: skip
+    """The encoded views at poses, and the poses of those that are worth learning.
 
     A view without contrast, as an eye has whose view a plant covers altogether, is left out: it holds nothing to recognise, yet after
     normalising it lies nearer to every view than most true matches do. progress(done, total) is called after each batch.
@@ -74,5 +74,14 @@ def learn(
         raise InputError(
             f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})"
         )
-    model.fit(torch.cat(images))
-    return np.concatenate(kept)
+    return torch.cat(images), np.concatenate(kept)
+
+
+def learn(
+    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"],
+    progress: Callable[[int, int], object] = lambda done, total: None,
+) -> Float[np.ndarray, "m 3"]:  # fmt: skip
+    """Fit the model to the views at poses; return the poses whose views it learned. See `training_views`."""
+    views, kept = training_views(encoding, renderer, poses, progress)
+    model.fit(views)
+    return kept

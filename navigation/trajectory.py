@@ -12,7 +12,8 @@ from world.files import replacing
 from .agent import ARRIVED, Step
 
 COLUMNS = (
-    "step", "x_m", "y_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg", "match", "reset", "reason",
+    "step", "x_m", "y_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
+    "match", "place", "reset", "reason",
 )  # fmt: skip
 
 
@@ -27,7 +28,7 @@ class Trajectory:
         self.rows.append((
             step.index, step.pose.x, step.pose.y, float(np.degrees(step.pose.heading)), float(np.degrees(step.turn)),
             float(step.familiarity.max()), step.deviation, step.along, float(np.degrees(step.error)),
-            "" if step.match is None else step.match, step.reset or "", step.reason or "",
+            "" if step.match is None else step.match, "" if step.place is None else step.place, step.reset or "", step.reason or "",
         ))  # fmt: skip
 
     def __len__(self) -> int:

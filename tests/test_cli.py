@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from navigation.cli import main
+from navigation.model_files import load_model
+from navigation.models import MODELS
 from render.eye import Eye
 from render.renderer import open_renderer
-from world.files import read_world
+from world.files import read_route, read_world
 from world.scene import World
 
 TUSSOCK = str(Path(sys.executable).with_name("tussock"))
@@ -41,8 +43,9 @@ def files(folder: Path) -> set[str]:
 def test_help_names_every_command(capfd):
     code, out, _ = tussock(capfd, "--help")
     assert code == 0
-    assert all(name in out for name in ("world", "view", "evaluate", "run", "play"))
-    for name in ("world", "view", "evaluate", "run", "play"):
+    names = ("world", "view", "route", "evaluate", "train", "compare", "models", "run", "play")
+    assert all(name in out for name in names)
+    for name in names:
         assert tussock(capfd, name, "--help")[0] == 0
 
 
@@ -147,6 +150,121 @@ def test_two_processes_with_one_seed_write_the_same_bytes(tmp_path):
     assert a == b
 
 
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory) -> Path:
+    """A model file that tussock train wrote."""
+    path = tmp_path_factory.mktemp("trained") / "m.safetensors"
+    main(["train", *SMALL, "--model", "infomax", "--learning-walk-m", "0", "--out", str(path), "--json"])
+    return path
+
+
+def test_a_trained_model_does_what_training_in_place_does(capfd, tmp_path, trained):
+    same = ("median_error_deg", "mean_error_deg", "n_views", "model", "encoding")
+    _, in_place, _ = tussock(capfd, "evaluate", *SMALL, "--model", "infomax", "--json")
+    # The size and encoding come from the file.
+    _, from_file, _ = tussock(capfd, "evaluate", "--world", "tiny", "--seed", 2, "--model", trained, "--json")
+    assert [json.loads(in_place)[key] for key in same] == [json.loads(from_file)[key] for key in same]
+    code, _, _ = tussock(
+        capfd, "run", "--world", "tiny", "--seed", 2, "--model", trained, "--out", tmp_path / "run", "--max-steps", 3
+    )
+    assert code == 0
+    assert (
+        json.loads((tmp_path / "run" / "summary.json").read_text())["settings"]["n_views"]
+        == json.loads(in_place)["n_views"]
+    )
+
+
+def test_a_trained_model_goes_on_learning_in_constant_memory(capfd, tmp_path, trained):
+    tussock(
+        capfd,
+        "route",
+        "--world",
+        "tiny",
+        "--seed",
+        2,
+        "--route-seed",
+        5,
+        "--length-m",
+        2,
+        "--out",
+        tmp_path / "second.csv",
+    )
+    go_on = ["train", *SMALL, "--model", trained, "--route", tmp_path / "second.csv", "--learning-walk-m", 0]
+    code, printed, _ = tussock(capfd, *go_on, "--out", tmp_path / "both.safetensors", "--json")
+    assert code == 0
+    result = json.loads(printed)
+    assert result["n_views"] > 50
+    assert result["model"] == "infomax"
+    assert result["memory_bytes"] == load_model(trained).model.memory_bytes
+    tussock(capfd, "train", *SMALL, "--model", "rbm", "--out", tmp_path / "rbm.safetensors")
+    code, _, err = tussock(
+        capfd, "train", *SMALL, "--model", tmp_path / "rbm.safetensors", "--out", tmp_path / "two.safetensors"
+    )
+    assert code == 2
+    assert "rbm learns all its views at once" in err
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["--encoding", "grey"], "leave out --encoding"),
+        (["--size", "90x20"], "another eye"),
+        (["--top-deg", "50"], "another eye"),
+    ],
+)
+def test_a_trained_model_refuses_what_it_did_not_learn_with(capfd, trained, flags, message):
+    code, out, err = tussock(capfd, "evaluate", "--world", "tiny", "--seed", 2, "--model", trained, *flags)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.splitlines()) == 1
+
+
+def test_compare_says_what_evaluate_and_run_say(capfd, tmp_path):
+    names = "perfect-memory,opponent-mushroom-body"
+    code, printed, _ = tussock(capfd, "compare", *SMALL, "--models", names, "--json")
+    assert code == 0
+    rows = json.loads(printed)["models"]
+    assert list(rows) == names.split(",")
+    for name, row in rows.items():
+        assert set(row) == {
+            "median_error_deg", "mean_error_deg", "share_over_45", "arrived", "memory_bytes", "fit_seconds", "scan_ms",
+        }  # fmt: skip
+        evaluated = json.loads(tussock(capfd, "evaluate", *SMALL, "--model", name, "--json")[1])
+        assert all(row[key] == evaluated[key] for key in ("median_error_deg", "mean_error_deg", "share_over_45"))
+        walked = tussock(capfd, "run", *SMALL, "--model", name, "--offset-m", 0.1, "--out", tmp_path / name, "--json")[
+            1
+        ]
+        assert row["arrived"] == json.loads(walked)["arrived"]
+    code, table, _ = tussock(capfd, "compare", *SMALL, "--models", "perfect-memory")
+    assert code == 0
+    assert re.search(r"perfect-memory .*(yes|no)", table)
+
+
+def test_models_lists_each_with_a_line_and_its_paper(capfd):
+    code, printed, _ = tussock(capfd, "models", "--json")
+    assert code == 0
+    models = json.loads(printed)["models"]
+    assert [*MODELS, "opponent-..."] == list(models)
+    assert all(len(row["what"]) > 20 and row["paper"] for row in models.values())
+    assert "Ardin" in tussock(capfd, "models")[1]
+
+
+def test_routes_of_several_seeds_lead_to_one_goal(capfd, tmp_path):
+    ends = []
+    for seed in (1, 2):
+        out, picture = tmp_path / f"{seed}.csv", tmp_path / f"{seed}.png"
+        code, printed, _ = tussock(
+            capfd, "route", "--seed", 5, "--route-seed", seed, "--goal", "4.9,4.9", "--length-m", 4, "--out", out,
+            "--picture", picture, "--json",
+        )  # fmt: skip
+        assert code == 0
+        assert read_route(out).goal[:2] == pytest.approx(json.loads(printed)["goal"], abs=1e-6)
+        assert cv2.imread(str(picture)) is not None
+        ends.append(read_route(out))
+    assert all(np.hypot(*(np.array(route.goal[:2]) - 4.9)) < 0.1 for route in ends)
+    assert np.hypot(*(ends[0].xy[0] - ends[1].xy[0])) > 0.5
+
+
 BAD = {
     "a missing world": (["view", "--world", "nowhere.glb"], r"there is no world file nowhere\.glb"),
     "a truncated world": (["view", "--world", "cut.glb"], r"cut\.glb cannot be read"),
@@ -163,7 +281,10 @@ BAD = {
     "a NaN pose": (["view", "--world", "tiny", "--at", "nan,2,0"], "outside the world"),
     "size 0": (["view", "--world", "tiny", "--size", "0x0"], "0 x 0 pixels"),
     "a size that is none": (["run", *SMALL, "--size", "big", "--out", "r"], "columns x rows"),
-    "an unknown model": (["run", *SMALL, "--model", "oracle", "--out", "r"], "visual-compass, perfect-memory, mlp"),
+    "an unknown model": (
+        ["run", *SMALL, "--model", "oracle", "--out", "r"],
+        "visual-compass, perfect-memory, chain, mlp",
+    ),
     "an unknown encoding": (["run", *SMALL, "--encoding", "smell", "--out", "r"], "grey, sky, edges"),
     "an unknown renderer": (["run", *SMALL, "--renderer", "vulkan", "--out", "r"], "auto, cpu, egl, osmesa"),
     "a scan of nothing": (["evaluate", *SMALL, "--scan-deg", "0"], "scan"),
@@ -192,6 +313,20 @@ BAD = {
         "no rerun viewer",
     ),
     "nothing to play": (["play", "."], "no recording"),
+    "a missing model file": (["evaluate", *SMALL, "--model", "no.safetensors"], r"no model file no\.safetensors"),
+    "a model file that is none": (
+        ["run", *SMALL, "--model", "odd.safetensors", "--out", "r"],
+        r"odd\.safetensors is no model",
+    ),
+    "an opponent of nothing": (["evaluate", *SMALL, "--model", "opponent-oracle"], "unknown model 'oracle'"),
+    "an odd model ending": (["train", *SMALL, "--out", "m.pt"], r"\.safetensors"),
+    "a model into nowhere": (["train", *SMALL, "--out", "no/m.safetensors"], "there is no folder no"),
+    "an unknown model to compare": (["compare", *SMALL, "--models", "rbm,oracle"], "unknown model 'oracle'"),
+    "no model to compare": (["compare", *SMALL, "--models", ""], "unknown model ''"),
+    "a device that is none": (["evaluate", *SMALL, "--device", "abacus"], "device 'abacus' cannot be used"),
+    "a goal outside": (["route", "--world", "tiny", "--goal", "99,1", "--out", "r.csv"], "a goal at"),
+    "a goal that is none": (["route", "--world", "tiny", "--goal", "home", "--out", "r.csv"], "give X,Y"),
+    "a route as .bin": (["route", "--world", "tiny", "--out", "r.bin"], r"\.csv"),
     "a view as .jpg": (["view", "--world", "tiny", "--at", "1,1,0", "--out", "v.jpg"], r"\.png"),
     "a view into nowhere": (["view", "--world", "tiny", "--at", "1,1,0", "--out", "no/v.png"], "there is no folder no"),
 }
@@ -201,6 +336,7 @@ BAD = {
 def test_bad_input_is_one_line_exit_2_and_leaves_nothing(capfd, tmp_path, monkeypatch, what):
     arguments, message = BAD[what]
     monkeypatch.chdir(tmp_path)
+    Path("odd.safetensors").write_bytes(b"\0" * 100)
     Path("odd.bin").write_bytes(b"\0" * 100)
     Path("nan.csv").write_text("x_m,y_m,heading_deg\n1,1,0\nnan,1,0\n2,2,0\n")
     Path("in").mkdir()

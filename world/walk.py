@@ -44,13 +44,14 @@ def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "
     return distance
 
 
-def generate_route(world: World, seed: int, length: float = 8.0) -> Route:
+def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[float, ...] | None = None) -> Route:
     """A smooth route with 2 to 4 corners through a world; the same world and seed give the same bytes.
 
     length: of the route (m). Where the field is too small for it, the route is 0.8 of the field's diagonal long.
     The route stays 5 % of the field's shorter side (at most 0.3 m) inside the field, and 4 cm clear of everything that
     stands below 6 cm, except for what lies lower than 8 mm. Points are 1 cm apart, each heading towards the next.
-    Raises InputError where the world has no room for it.
+    goal: where it ends (m), to within a decimetre; so routes with several seeds lead to one place.
+    Raises InputError where the world has no room for it, or none at the goal.
     """
     if not (np.isfinite(length) and length >= 0.1):
         raise InputError(f"a route of {length} m; give a length of at least 0.1 m")
@@ -59,16 +60,18 @@ def generate_route(world: World, seed: int, length: float = 8.0) -> Route:
     length = min(float(length), 0.8 * float(np.hypot(*sides)))
     margin = min(0.3, 0.05 * float(sides.min()))
     inside = Bounds(field.x_min + margin, field.y_min + margin, field.x_max - margin, field.y_max - margin)
+    if goal is not None:
+        _check_goal(world, goal, inside)
     nodes, graph = _graph(_room(world, inside), inside)
     for _ in range(TRIES if len(nodes) else 0):
-        corners = _zigzag(inside, length, rng)
+        corners = _zigzag(inside, length, rng, goal)  # from the goal, where there is one
         path = _walked(corners, nodes, graph) if corners is not None else None
         if path is None:
             continue
         for smoothing in (0.16, 0.11, 0.07, 0.045):
             route = _smoothed(path, smoothing, length)
             if route is not None and _is_good(route, inside) and clearance(world, route).min() >= KEEP_AWAY:
-                return Route.through(route)
+                return Route.through(route if goal is None else route[::-1])
     raise InputError(
         f"found no route of {length:.2f} m in the field ({field}) that keeps {100 * KEEP_AWAY:g} cm clear of plants; "
         "ask for a shorter one or for less vegetation"
@@ -141,16 +144,27 @@ def _graph(room: Float[np.ndarray, "rows columns"], inside: Bounds) -> tuple[Flo
     return xy[stands], graph[stands][:, stands]
 
 
-def _zigzag(inside: Bounds, length: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2"] | None:
+def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
+    x, y = goal
+    if not (np.isfinite(goal).all() and inside.contains(x, y)):
+        raise InputError(f"a goal at ({x:g}, {y:g}) m; choose one inside the field, off its edge ({inside})")
+    room = float(clearance(world, np.array([goal]))[0])
+    if room < PREFERRED:
+        raise InputError(f"the goal ({x:g}, {y:g}) m has {room:.2f} m of room about it; choose one with {PREFERRED} m")
+
+
+def _zigzag(
+    inside: Bounds, length: float, rng: np.random.Generator, start: tuple[float, ...] | None = None
+) -> Float[np.ndarray, "n 2"] | None:
     """Ends and corners of 3 to 5 straight legs, somewhat longer than `length`, or None if chance found none inside."""
     n, legs = 400, int(rng.integers(3, 6))
     turn = np.radians(rng.uniform(35, 110, (n, legs))) * rng.choice([-1, 1], (n, 1)) * (-1) ** np.arange(legs)
     turn *= np.where(rng.random((n, legs)) < 0.15, -1, 1)  # now and then it keeps turning the same way
     turn[:, 0] = rng.uniform(-np.pi, np.pi, n)
     direction, leg = turn.cumsum(axis=1), 1.06 * length * rng.dirichlet(np.full(legs, 8.0), n)
-    start = rng.uniform(inside[:2], inside[2:], (n, 2))
+    first = rng.uniform(inside[:2], inside[2:], (n, 2)) if start is None else np.tile(start, (n, 1))
     steps = leg[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=2)
-    corners = np.concatenate([start[:, None], start[:, None] + steps.cumsum(axis=1)], axis=1)
+    corners = np.concatenate([first[:, None], first[:, None] + steps.cumsum(axis=1)], axis=1)
     fits = inside.contains(corners[..., 0], corners[..., 1]).all(axis=1)
     fits &= np.hypot(*(corners[:, -1] - corners[:, 0]).T) > 0.35 * length  # it leads somewhere
     return corners[fits.argmax()] if fits.any() else None

@@ -1,27 +1,78 @@
-"""The familiarity models by name."""
+"""The familiarity models by name. Each is loaded when it is first used: one needs scikit-learn, which takes a second to import."""
 
-from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 from world.errors import InputError
 
-from ..familiarity import FamiliarityModel
-from .mlp import MLP
-from .perfect_memory import PerfectMemory
-from .visual_compass import VisualCompass
+from ..familiarity import Model
 
-# Each takes a seed, which those that draw nothing ignore.
-MODELS: dict[str, Callable[[int], FamiliarityModel]] = {
-    "visual-compass": lambda seed: VisualCompass(),
-    "perfect-memory": lambda seed: PerfectMemory(),
-    "mlp": lambda seed: MLP(seed=seed),
+if TYPE_CHECKING:
+    from .adaboost import AdaBoost
+    from .autoencoder import Autoencoder
+    from .chain import Chain
+    from .infomax import Infomax
+    from .mlp import MLP
+    from .mlp_mixture import MLPMixture
+    from .mlp_rotation import MLPRotation
+    from .mushroom_body import MushroomBody
+    from .opponent import opponent
+    from .perfect_memory import PerfectMemory
+    from .rbm import RBM
+    from .visual_compass import VisualCompass
+
+__all__ = [
+    "MLP",
+    "MODELS",
+    "RBM",
+    "AdaBoost",
+    "Autoencoder",
+    "Chain",
+    "Infomax",
+    "MLPMixture",
+    "MLPRotation",
+    "MushroomBody",
+    "PerfectMemory",
+    "VisualCompass",
+    "make_model",
+    "opponent",
+]
+
+# A model is the class in the file of its name.
+MODELS = {
+    "visual-compass": "VisualCompass",
+    "perfect-memory": "PerfectMemory",
+    "chain": "Chain",
+    "mlp": "MLP",
+    "mlp-rotation": "MLPRotation",
+    "mlp-mixture": "MLPMixture",
+    "adaboost": "AdaBoost",
+    "rbm": "RBM",
+    "autoencoder": "Autoencoder",
+    "infomax": "Infomax",
+    "mushroom-body": "MushroomBody",
 }
+OPPONENT = "opponent-"  # before a model's name: the model twice, opposed
+_HOME = {cls: name.replace("-", "_") for name, cls in MODELS.items()} | {"opponent": "opponent"}
 
 
-def make_model(name: str, seed: int = 0) -> FamiliarityModel:
-    """An untrained model by its name. Raises InputError that lists the known ones."""
+def __getattr__(name: str):
+    if name in _HOME:
+        return getattr(import_module(f".{_HOME[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def model_class(name: str) -> type[Model]:
+    """The class of a model's name. Raises InputError that lists the known ones."""
     if name not in MODELS:
-        raise InputError(f"unknown model {name!r}; known: {', '.join(MODELS)}")
-    return MODELS[name](seed)
+        raise InputError(f"unknown model {name!r}; known: {', '.join(MODELS)}, or {OPPONENT} and one of these")
+    return __getattr__(MODELS[name])
 
 
-__all__ = ["MLP", "MODELS", "PerfectMemory", "VisualCompass", "make_model"]
+def make_model(name: str, **parameters) -> Model:
+    """An untrained model by its name; parameters are its class's, such as seed and device. Raises InputError for unknown names."""
+    if name.startswith(OPPONENT):
+        from .opponent import opponent
+
+        return opponent(make_model(name.removeprefix(OPPONENT), **parameters))
+    return model_class(name)(**parameters)

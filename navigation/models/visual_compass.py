@@ -1,23 +1,34 @@
-"""The visual compass: one snapshot and the rotation that brings it back (Zeil, Hofmann and Chahl 2003; thesis 4.2)."""
+"""The visual compass: one snapshot, and the rotation that brings it back."""
 
 import torch
-from jaxtyping import Float32, Int64
+from jaxtyping import Int64
 
-from ..familiarity import Images, check_training
+from ..familiarity import Images, Learned, Model, Scans
 from .perfect_memory import PerfectMemory
 
 
-class VisualCompass(PerfectMemory):
-    """Perfect memory of a single view: the last one it is given, which is the view at the goal."""
+class VisualCompass(Model):
+    """Keeps one view, the last it is given, which is the one at the goal; familiarity is minus the RMS difference from it.
 
-    def fit(self, views: Images) -> "VisualCompass":
-        """Store the last view."""
-        check_training(views)
-        super().fit(views[-1:])
-        self._index = len(views) - 1
-        return self
+    Section 4.2 of the thesis. Memory: one view.
+    """
 
-    def match(self, views: Images) -> tuple[Float32[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
+    name = "visual-compass"
+    paper = "Zeil, Hofmann and Chahl 2003"
+
+    def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and the index of the last learned view throughout."""
-        familiarity, first = super().match(views)
-        return familiarity, first + self._index
+        familiarity = self.scan(views)
+        return familiarity, self.learned["index"].expand(familiarity.shape)
+
+    def _learn(self, views: Images) -> Learned:
+        return {"snapshot": views[-1:].clone(), "index": torch.tensor(len(views) - 1)}
+
+    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+        return {"snapshot": (1, height, width), "index": ()}
+
+    def _prepare(self) -> None:
+        self._memory = PerfectMemory(device=self.device).fit(self.learned["snapshot"])
+
+    def _scan(self, views: Images) -> Scans:
+        return self._memory.scan(views)

@@ -1,0 +1,388 @@
+"""What each command takes and does: a dataclass with a field a flag. Heavy packages are imported where they are used."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from world.errors import InputError
+
+from .options import FILE_SUFFIX, WORLD, LearningOptions, RouteOptions, SightOptions
+from .terminal import progress, say
+
+NOT_SETTINGS = ("out", "overwrite", "live", "viewer", "json")  # flags of a run that do not change what happens in it
+
+
+@dataclass
+class WorldCommand:
+    """Grow a world and save it."""
+
+    out: Path
+    """File to write: .glb or .ply."""
+    preset: str = "tussock-field"
+    """tussock-field, meadow, scrub or tiny."""
+    seed: int = 0
+    """The same seed gives the same file."""
+    picture: Path | None = None
+    """Also draw the world from above into this file (.png or .svg)."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from world.files import check_writable, write_world
+        from world.scene import World
+
+        check_writable(self.out)
+        check_picture(self.picture)
+        world = World.generate(self.preset, self.seed)
+        write_world(world, self.out)
+        if self.picture is not None:
+            from .plots import overview
+
+            overview(world, self.picture, title=f"{self.preset}, seed {self.seed}")
+        return {"world": str(self.out), "preset": self.preset, "seed": self.seed, "triangles": len(world.triangles)}
+
+
+@dataclass
+class ViewCommand(SightOptions):
+    """Draw the panorama seen at a pose."""
+
+    at: Annotated[str | None, tyro.conf.arg(metavar="X,Y,HEADING_DEG")] = None
+    """Where to stand (m) and face (degrees counter-clockwise from +x, east). Default: the middle of the world, facing north."""
+    out: Path = Path("view.png")
+    """PNG to write: ahead in the middle, behind at both edges."""
+    alpha: bool = False
+    """Write RGBA: alpha is the share of each pixel that is not open sky."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        import cv2
+        import numpy as np
+
+        from world.files import check_writable, replacing
+
+        if self.out.suffix.lower() != ".png":
+            raise InputError(f"{self.out}: a view is written as .png")
+        check_writable(self.out)
+        world = self.open_world()
+        x, y, heading_deg = self.place(world.field)
+        with self.open_renderer(world) as renderer:
+            view = renderer.render([(x, y, math.radians(heading_deg))])[0]
+            backend = renderer.backend
+        say(f"renderer: {backend}")
+        image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
+        with replacing(self.out) as partial:
+            partial.write_bytes(
+                cv2.imencode(".png", image if self.alpha else np.ascontiguousarray(image[..., :3]))[1].tobytes()
+            )
+        return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
+
+    def place(self, field) -> tuple[float, float, float]:
+        """x, y (m) and heading (degrees) to look from."""
+        if self.at is None:
+            return (field.x_min + field.x_max) / 2, (field.y_min + field.y_max) / 2, 90.0
+        x, y, heading_deg = numbers(self.at, "--at", "X,Y,HEADING_DEG", "5,5,90")
+        if not (math.isfinite(heading_deg) and field.contains(x, y)):
+            raise InputError(f"--at {self.at}: that is outside the world ({field}); choose a place inside")
+        return x, y, heading_deg
+
+
+@dataclass
+class RouteCommand:
+    """Find a walkable route through a world and save it; several seeds and one goal give several routes to one place."""
+
+    world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
+    seed: int = 0
+    """The same seed gives the same route (and world, where it is generated)."""
+    route_seed: int | None = None
+    """Seed of the route alone. Default: --seed."""
+    length_m: float = 8.0
+    """Length of the route."""
+    goal: Annotated[str | None, tyro.conf.arg(metavar="X,Y")] = None
+    """Where it ends (m), to within a decimetre. Default: anywhere."""
+    out: Path = Path("route.csv")
+    """File to write (.csv)."""
+    picture: Path | None = None
+    """Also draw world and route from above into this file (.png or .svg)."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from world.files import check_writable, write_route
+        from world.walk import generate_route
+
+        if self.out.suffix.lower() != ".csv":
+            raise InputError(f"{self.out}: a route is written as .csv")
+        check_writable(self.out)
+        check_picture(self.picture)
+        goal = None if self.goal is None else numbers(self.goal, "--goal", "X,Y", "5,5")
+        world = SightOptions(world=self.world, seed=self.seed).open_world()
+        seed = self.seed if self.route_seed is None else self.route_seed
+        route = generate_route(world, seed, self.length_m, goal=goal)
+        write_route(route, self.out)
+        if self.picture is not None:
+            from .plots import overview
+
+            overview(world, self.picture, route=route, title=f"{self.world}, route {seed}")
+        return {"route": str(self.out), "length_m": route.length, "start": route.start[:2], "goal": route.goal[:2]}
+
+
+@dataclass
+class EvaluateCommand(LearningOptions):
+    """Learn a route, then recover the heading at every grid position beside it."""
+
+    grid_m: float = 0.2
+    """Positions are the multiples of this in x and y .."""
+    within_m: float = 0.2
+    """.. within this distance of the route."""
+    scan_deg: float = 360.0
+    """Width of the scan; under 360 it is centred on the right heading."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        import time
+
+        from .evaluation import grid_positions, heading_errors
+
+        began = time.perf_counter()
+        if not 0 < self.scan_deg <= 360:
+            raise InputError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
+        lesson = self.prepare()
+        positions = grid_positions(lesson.route, grid=self.grid_m, within=self.within_m, field=lesson.world.field)
+        with self.open_renderer(lesson.world) as renderer:
+            learned = lesson.teach(renderer)
+            with progress("recovering headings", "positions") as report:
+                found = heading_errors(
+                    lesson.model, lesson.encoding, renderer, lesson.route_views, positions,
+                    scan=math.radians(self.scan_deg), progress=report,
+                )  # fmt: skip
+        return {
+            "model": lesson.model.name, "encoding": str(lesson.encoding), "n_views": len(learned), "n_positions": len(positions),
+            "median_error_deg": found.median_error_deg, "mean_error_deg": found.mean_error_deg,
+            "share_over_45": found.share_over_45, "seconds": time.perf_counter() - began,
+        }  # fmt: skip
+
+
+@dataclass
+class TrainCommand(LearningOptions):
+    """Learn a route and keep the model in a file, for evaluate and run."""
+
+    out: Path = Path("model.safetensors")
+    """File to write."""
+    learning_walk_m: float = 0.2
+    """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        import time
+
+        import numpy as np
+
+        from world.files import check_writable
+
+        from .familiarity import ViewByView
+        from .model_files import save_model
+        from .training import training_views
+
+        if self.out.suffix != FILE_SUFFIX:
+            raise InputError(f"{self.out}: a model is written as {FILE_SUFFIX}")
+        check_writable(self.out)
+        lesson = self.prepare()
+        model, known = lesson.model, lesson.known
+        if known is not None and not isinstance(model, ViewByView):
+            raise InputError(
+                f"{self.model}: {model.name} learns all its views at once and cannot go on; give --model {model.name}"
+            )
+        with self.open_renderer(lesson.world) as renderer:
+            with progress("looking", "views") as report:
+                views, poses = training_views(lesson.encoding, renderer, lesson.poses, report)
+            say(f"learning {len(views)} views")
+            began = time.perf_counter()
+            if known is not None and isinstance(model, ViewByView):
+                model.partial_fit(views)
+                poses = np.concatenate([known, poses])
+            else:
+                model.fit(views)
+            seconds = time.perf_counter() - began
+            save_model(model, self.out, encoding=lesson.encoding, eye=renderer.eye, poses=poses)
+        return {
+            "file": str(self.out), "model": model.name, "encoding": str(lesson.encoding), "n_views": len(poses),
+            "memory_bytes": model.memory_bytes, "fit_seconds": seconds,
+        }  # fmt: skip
+
+
+@dataclass
+class CompareCommand(RouteOptions):
+    """Train and test models side by side: headings recovered beside the route, and a walk home."""
+
+    models: str = "all"
+    """all, or names separated by commas (see tussock models)."""
+    learning_walk_m: float = 0.2
+    """Reach of the learning walk before the walk home. Headings are recovered from views on the route alone."""
+    grid_m: float = 0.2
+    """Headings are recovered at the multiples of this in x and y .."""
+    within_m: float = 0.2
+    """.. within this distance of the route."""
+    offset_m: float = 0.1
+    """The walk home starts this far to the left of the route (negative: right)."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from .comparison import compare_models
+        from .evaluation import grid_positions
+        from .models import MODELS, make_model
+
+        names = list(MODELS) if self.models == "all" else [name.strip() for name in self.models.split(",")]
+        for name in names:
+            make_model(name)  # refuses unknown ones before the work begins
+        encoding = self.chosen_encoding()
+        world, route = self.open_route()
+        views = route.resampled(self.spacing_m)
+        positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
+        rows = {}
+        with self.open_renderer(world) as renderer, progress("comparing", "models") as report:
+            compared = compare_models(
+                [partial(make_model, name, seed=self.seed, device=self.device) for name in names],
+                encoding=encoding, renderer=renderer, route=route, route_views=views, positions=positions,
+                every=self.every, learning_walk=self.learning_walk_m, offset=self.offset_m, seed=self.seed,
+            )  # fmt: skip
+            report(0, len(names))
+            for name, row in zip(names, compared, strict=True):
+                rows[name] = dataclasses.asdict(row)
+                report(len(rows), len(names))
+        return {"encoding": str(encoding), "n_views": len(views.xy), "n_positions": len(positions), "models": rows}
+
+
+@dataclass
+class ModelsCommand:
+    """List the familiarity models, what they do and where they come from."""
+
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from .models import MODELS, OPPONENT, model_class
+        from .models.opponent import Opponent
+
+        classes = {name: model_class(name) for name in MODELS} | {f"{OPPONENT}...": Opponent}
+        return {"models": {name: {"what": summary(cls), "paper": cls.paper} for name, cls in classes.items()}}
+
+
+@dataclass
+class RunCommand(LearningOptions):
+    """Learn a route and walk it home, recorded."""
+
+    learning_walk_m: float = 0.2
+    """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
+    step_m: float = 0.05
+    """Length of a step."""
+    offset_m: float = 0.0
+    """Start this far to the left of the route (negative: right)."""
+    heading_noise_deg: float = 0.0
+    """Standard deviation of the noise on every turn."""
+    scan_deg: float = 180.0
+    """Width of the scan."""
+    scan_about_deg: float | None = None
+    """Centre the scan on this direction of the world instead of the present heading."""
+    on_lost: Annotated[str, tyro.conf.arg(metavar="stop|reset")] = "stop"
+    """stop, or reset: put the agent back on the route after the furthest waypoint reached, and count it."""
+    arrive_m: float = 0.15
+    """Arrived within this distance of the route's end."""
+    lost_m: float = 0.5
+    """Lost beyond this distance from the route."""
+    patience_m: float = 3.0
+    """Stuck in a loop after walking this far without getting farther along the route."""
+    max_steps: int | None = None
+    """Out of steps after so many. Default: as many as walk the route's length three times."""
+    out: Path = Path("run")
+    """Folder for the recording, trajectory, summary and picture."""
+    overwrite: bool = False
+    """Replace the run that the folder holds."""
+    live: bool = False
+    """Also stream to a running rerun viewer, at --viewer."""
+    viewer: str = "rerun+http://127.0.0.1:9876/proxy"
+    """Address of the viewer for --live."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from .agent import Agent
+        from .runs import check_run_folder, record_walk
+
+        viewer = self.viewer if self.live else None
+        inputs = [Path(name) for name in (self.world, self.route) if name is not None]
+        check_run_folder(self.out, overwrite=self.overwrite, inputs=inputs, viewer=viewer)
+        if self.on_lost not in ("stop", "reset"):
+            raise InputError(f"--on-lost {self.on_lost!r}: give stop or reset")
+        lesson = self.prepare()
+        with self.open_renderer(lesson.world) as renderer:
+            agent = Agent(
+                renderer=renderer, encoding=lesson.encoding, model=lesson.model, route=lesson.route,
+                step_length=self.step_m, scan=math.radians(self.scan_deg),
+                scan_about=None if self.scan_about_deg is None else math.radians(self.scan_about_deg),
+                heading_noise=math.radians(self.heading_noise_deg), arrive=self.arrive_m, lost=self.lost_m,
+                patience=self.patience_m, max_steps=self.max_steps, reset_when_lost=self.on_lost == "reset",
+                seed=self.seed,
+            )  # fmt: skip
+            start = agent.start(self.offset_m)
+            learned = lesson.teach(renderer)
+            settings = {key: value for key, value in dataclasses.asdict(self).items() if key not in NOT_SETTINGS}
+            settings |= {"encoding": str(lesson.encoding), "renderer": renderer.backend, "n_views": len(learned)}
+            with progress("walking", "steps") as report:
+                return record_walk(
+                    agent, start, self.out, overwrite=self.overwrite, training_poses=learned, settings=settings,
+                    viewer=viewer, progress=report,
+                )  # fmt: skip
+
+
+@dataclass
+class PlayCommand:
+    """Open a run's recording in the rerun viewer."""
+
+    run_folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
+    """Folder of the run, or its .rrd file."""
+    web: bool = False
+    """Serve the viewer to a browser on this machine instead of opening a window."""
+    screenshot: Path | None = None
+    """Save a picture (.png) of the viewer instead, without a display."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from .runs import play
+
+        return play(self.run_folder, web=self.web, screenshot=self.screenshot)
+
+
+def numbers(text: str, flag: str, form: str, example: str) -> tuple[float, ...]:
+    """Numbers separated by commas, as many as the form has."""
+    try:
+        found = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) != form.count(",") + 1:
+        raise InputError(f"{flag} {text!r}: give {form}, for example {example}")
+    return found
+
+
+def check_picture(path: Path | None) -> None:
+    """Refuse a picture that could not be written after the work. Raises InputError."""
+    from world.files import check_writable
+
+    if path is not None:
+        check_writable(path)
+        if path.suffix.lower() not in (".png", ".svg"):
+            raise InputError(f"{path}: a picture from above is written as .png or .svg")
+
+
+def summary(cls: type) -> str:
+    """The first sentence of a class's documentation."""
+    return " ".join((cls.__doc__ or "").split("\n\n")[0].split()).rstrip(".")

@@ -1,0 +1,101 @@
+"""A network trained to pick the right rotation of each view out of all its rotations."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+import torch
+from jaxtyping import Int64
+from torch.nn.functional import log_softmax, relu
+
+from ..familiarity import Images, Learned, Model, Scans
+from ..rotation import FilterBank, bell
+
+
+@dataclass(kw_only=True, eq=False)
+class MLPRotation(Model):
+    """One hidden layer of ReLU units whose output at all rotations of a view is a softmax: every wrong rotation is a negative.
+
+    The target is a Gaussian over the rotations about the learned heading, so that neighbours are nearly as good. Noise on the
+    views keeps a network with few views from learning them by heart. Trained by Adam; familiarity is the network's output.
+    Constant memory.
+
+    units: hidden ones. target_deg: standard deviation of the target. noise: standard deviation of the noise on the views, in
+    theirs. steps: of the training; None takes as many as there are views, at least 500. rate, batch_size, penalty (decoupled
+    weight decay): of the training.
+    """
+
+    name = "mlp-rotation"
+    paper = "the thesis's network, trained on all rotations; here"
+
+    LIMITS = {"target_deg": (0.1, 180.0)}  # noqa: RUF012
+    units: int = 100
+    target_deg: float = 6.0
+    noise: float = 1.5
+    steps: int | None = None
+    rate: float = 5e-3
+    batch_size: int = 25
+    penalty: float = 0.3
+
+    def stretch_of(self, views: Images) -> Int64[torch.Tensor, " n"]:
+        """Which of several networks each training view is for: here there is one."""
+        return torch.zeros(len(views), dtype=torch.int64)
+
+    def _learn(self, views: Images) -> Learned:
+        random = self._random()
+        stretch = self.stretch_of(views)
+        n, height, width = views.shape
+        steps = self.steps or max(500, n)
+        networks = int(stretch.max()) + 1
+        weights = torch.randn(networks * self.units, height, width, generator=random) / (height * width) ** 0.5
+        biases = torch.zeros(networks * self.units)
+        output = torch.randn(networks, self.units, generator=random) / self.units**0.5
+        parameters = [self._here(each).requires_grad_() for each in (weights, biases, output)]
+        weights, biases, output = parameters
+
+        target = self._here(bell(width, math.radians(self.target_deg)))
+        spread = self._here(views.std())
+        optimiser = torch.optim.AdamW(parameters, lr=self.rate, weight_decay=self.penalty)
+        schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: warmth(step / steps))
+        for batch in islice(batches(n, self.batch_size, random), steps):
+            noise = self._here(torch.randn(len(batch), height, width, generator=random))
+            seen = views[self._here(batch)] + self.noise * spread * noise
+            outputs = network_outputs(FilterBank(weights), biases, output, seen)  # (n, networks, w)
+            chances = log_softmax(outputs.flatten(start_dim=1), dim=1).reshape(outputs.shape)
+            right = chances[torch.arange(len(batch)), stretch[batch]]
+            loss = -(right @ target).mean()
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            schedule.step()
+        return {"weights": weights.detach(), "biases": biases.detach(), "output": output.detach()}
+
+    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+        return {"weights": (None, height, width), "biases": (None,), "output": (None, self.units)}
+
+    def _prepare(self) -> None:
+        self._bank = FilterBank(self.learned["weights"])
+
+    def _outputs(self, views: Images) -> torch.Tensor:
+        return network_outputs(self._bank, self.learned["biases"], self.learned["output"], views)
+
+    def _scan(self, views: Images) -> Scans:
+        return self._outputs(views)[:, 0]
+
+
+def batches(n: int, size: int, random: torch.Generator) -> Iterator[torch.Tensor]:
+    """Random indices below n without end: all of them, in batches, before any comes again."""
+    while True:
+        yield from torch.randperm(n, generator=random).split(size)
+
+
+def warmth(done: float) -> float:
+    """Share of the full rate when a share of the training is done: up in the first tenth, then down along a cosine."""
+    return min(1.0, 10 * done + 0.01) * 0.5 * (1 + math.cos(math.pi * done))
+
+
+def network_outputs(bank: FilterBank, biases: torch.Tensor, output: torch.Tensor, views: Images) -> torch.Tensor:
+    """Output (view, network, rotation) of networks that see the same views; `output` is (networks, units)."""
+    activity = relu(bank.responses(views) + biases[:, None])
+    return torch.einsum("nsuw,su->nsw", activity.unflatten(1, output.shape), output)
