@@ -56,6 +56,10 @@ def main(arguments: list[str] | None = None) -> None:
         fail(str(error))
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except RuntimeError as error:
+        if "allocate" not in str(error) and "out of memory" not in str(error):
+            raise
+        fail("not enough memory for this model; take fewer pixels (--resize), or another model")  # as torch says it
     except MemoryError as error:
         fail(f"not enough memory ({error}); take a smaller --size, or fewer views")
     except KeyboardInterrupt:

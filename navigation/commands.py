@@ -163,7 +163,8 @@ class EvaluateCommand(LearningOptions):
                     scan=math.radians(self.scan_deg), progress=report,
                 )  # fmt: skip
         return {
-            "model": lesson.model.name, "encoding": str(lesson.encoding), "n_views": len(learned), "n_positions": len(positions),
+            "model": lesson.model.name, "encoding": str(lesson.encoding),
+            "n_views": None if learned is None else len(learned), "n_positions": len(positions),
             "median_error_deg": found.median_error_deg, "mean_error_deg": found.mean_error_deg,
             "share_over_45": found.share_over_45, "seconds": time.perf_counter() - began,
         }  # fmt: skip
@@ -187,7 +188,7 @@ class TrainCommand(LearningOptions):
 
         from world.files import check_writable
 
-        from .familiarity import ViewByView
+        from .familiarity import IncrementalModel
         from .model_files import save_model
         from .training import training_views
 
@@ -195,8 +196,12 @@ class TrainCommand(LearningOptions):
             raise InputError(f"{self.out}: a model is written as {FILE_SUFFIX}")
         check_writable(self.out)
         lesson = self.prepare()
-        model, known = lesson.model, lesson.known
-        if known is not None and not isinstance(model, ViewByView):
+        model, saved = lesson.model, lesson.saved
+        if saved is None:
+            learn = model.fit
+        elif isinstance(model, IncrementalModel):
+            learn = model.partial_fit
+        else:
             raise InputError(
                 f"{self.model}: {model.name} learns all its views at once and cannot go on; give --model {model.name}"
             )
@@ -205,15 +210,13 @@ class TrainCommand(LearningOptions):
                 views, poses = training_views(lesson.encoding, renderer, lesson.poses, report)
             say(f"learning {len(views)} views")
             began = time.perf_counter()
-            if known is not None and isinstance(model, ViewByView):
-                model.partial_fit(views)
-                poses = np.concatenate([known, poses])
-            else:
-                model.fit(views)
+            learn(views)
+            if saved is not None:
+                poses = None if saved.poses is None else np.concatenate([saved.poses, poses])
             seconds = time.perf_counter() - began
             save_model(model, self.out, encoding=lesson.encoding, eye=renderer.eye, poses=poses)
         return {
-            "file": str(self.out), "model": model.name, "encoding": str(lesson.encoding), "n_views": len(poses),
+            "file": str(self.out), "model": model.name, "encoding": str(lesson.encoding), "n_views": len(views),
             "memory_bytes": model.memory_bytes, "fit_seconds": seconds,
         }  # fmt: skip
 
@@ -238,9 +241,13 @@ class CompareCommand(RouteOptions):
     def run(self) -> dict[str, Any]:
         from .comparison import compare_models
         from .evaluation import grid_positions
+        from .familiarity import check_device
         from .models import MODELS, make_model
+        from .training import training_poses
 
+        check_device(self.device)
         names = list(MODELS) if self.models == "all" else [name.strip() for name in self.models.split(",")]
+        names = list(dict.fromkeys(names))
         for name in names:
             make_model(name)  # refuses unknown ones before the work begins
         encoding = self.chosen_encoding()
@@ -258,7 +265,12 @@ class CompareCommand(RouteOptions):
             for name, row in zip(names, compared, strict=True):
                 rows[name] = dataclasses.asdict(row)
                 report(len(rows), len(names))
-        return {"encoding": str(encoding), "n_views": len(views.xy), "n_positions": len(positions), "models": rows}
+        return {
+            "encoding": str(encoding),
+            "n_views": len(training_poses(views, every=self.every)),
+            "n_positions": len(positions),
+            "models": rows,
+        }
 
 
 @dataclass
@@ -335,7 +347,10 @@ class RunCommand(LearningOptions):
             start = agent.start(self.offset_m)
             learned = lesson.teach(renderer)
             settings = {key: value for key, value in dataclasses.asdict(self).items() if key not in NOT_SETTINGS}
-            settings |= {"encoding": str(lesson.encoding), "renderer": renderer.backend, "n_views": len(learned)}
+            if lesson.saved is not None:  # they say nothing of what a model from a file has learned
+                settings = {key: value for key, value in settings.items() if key not in ("every", "learning_walk_m")}
+            n_views = None if learned is None else len(learned)
+            settings |= {"encoding": str(lesson.encoding), "renderer": renderer.backend, "n_views": n_views}
             with progress("walking", "steps") as report:
                 return record_walk(
                     agent, start, self.out, overwrite=self.overwrite, training_poses=learned, settings=settings,
@@ -384,5 +399,5 @@ def check_picture(path: Path | None) -> None:
 
 
 def summary(cls: type) -> str:
-    """The first sentence of a class's documentation."""
+    """The first paragraph of a class's documentation."""
     return " ".join((cls.__doc__ or "").split("\n\n")[0].split()).rstrip(".")

@@ -4,6 +4,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -14,6 +15,7 @@ from world.errors import InputError
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]
+SCAN_AT_ONCE = 64  # views; bounds the memory of a scan
 Learned = dict[str, torch.Tensor]
 Self = TypeVar("Self", bound="Model")
 
@@ -44,15 +46,6 @@ class SnapshotModel(FamiliarityModel, Protocol):
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and the index of the learned view that each rotation resembles most."""
-        ...
-
-
-@runtime_checkable
-class ViewByView(FamiliarityModel, Protocol):
-    """A model that can go on learning."""
-
-    def partial_fit(self, views: Images) -> "ViewByView":
-        """Learn further views of the same shape on top of what it knows; where that fails, it knows what it knew."""
         ...
 
 
@@ -106,6 +99,7 @@ class Model(ABC):
     def fit(self: Self, views: Images) -> Self:
         """Learn the views, forgetting earlier ones. Raises InputError for no views and for values that are not finite."""
         self.check_parameters()
+        check_device(self.device)
         check_training(views)
         views = self._here(views)
         self.restore((views.shape[1], views.shape[2]), self._learn(views))
@@ -116,35 +110,52 @@ class Model(ABC):
         check_scan(views, self.shape)
         if len(views) == 0:
             return torch.empty(0, views.shape[2])
-        return self._scan(self._here(views))
+        return torch.cat([self._scan(self._here(part)) for part in views.split(SCAN_AT_ONCE)])
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
         """Take over what was learned, from training or from a file. Raises InputError for tensors that cannot be this model's."""
-        self._check_fit(shape, learned)
-        self.learned = {key: self._here(tensor) for key, tensor in learned.items()}
-        self.shape = shape
-        self._prepare()
+        self.check_learned(shape, learned)
+        before = self.learned, self.shape
+        self.learned, self.shape = {key: self._here(tensor) for key, tensor in learned.items()}, shape
+        try:
+            self._prepare()
+        except BaseException:
+            self.learned, self.shape = before
+            if self.shape is not None:
+                self._prepare()
+            raise
 
     def check_parameters(self) -> None:
-        """Raise InputError for parameters that mean nothing.
+        """Raise InputError for parameters that mean nothing, going by their defaults.
 
-        Names are among CHOICES, numbers within LIMITS: by default fractions are at least 0, counts at least 1. Of several numbers,
-        there is at least one; counts among them are counts, fractions anything finite.
+        A name is one of CHOICES. A number lies within LIMITS; where these say nothing, a whole number is at least 1 (the seed 0), a
+        single other number at least 0. Where the default is several numbers, there is at least one.
         """
-        for key, value in self.parameters.items():
-            several = isinstance(value, (tuple, list))
-            for each in value if several else [value]:
-                if key in self.CHOICES and isinstance(each, str) and each not in self.CHOICES[key]:
-                    raise InputError(f"{self.name}: {key} {each!r}; give one of {', '.join(self.CHOICES[key])}")
-                if isinstance(each, (int, float)):
-                    usual = (-np.inf if several else 0, np.inf) if isinstance(each, float) else (1, np.inf)
-                    low, high = self.LIMITS.get(key, (0, 2**62) if key == "seed" else usual)
-                    if not (np.isfinite(each) and low <= each <= high):
-                        raise InputError(f"{self.name}: {key} {value}; give numbers from {low:g} to {high:g}")
-                elif not (isinstance(each, str) and (key in self.CHOICES or key == "device")) and each is not None:
-                    raise InputError(f"{self.name}: {key} {value!r}; give a number")
-            if several and not value:
-                raise InputError(f"{self.name}: {key} is empty; give at least one")
+        for each in dataclasses.fields(self):
+            value = getattr(self, each.name)
+            if each.init and each.name != "device" and not (value is None and each.default is None):
+                self._check_parameter(each.name, value, each.default)
+
+    def _check_parameter(self, name: str, value: Any, default: Any) -> None:
+        several = isinstance(default, tuple)
+        usual = default[0] if isinstance(default, tuple) else default
+        whole, choices = usual is None or isinstance(usual, int), self.CHOICES.get(name, ())
+        low, high = (1, 2**62) if whole else (-np.inf, np.inf) if several else (0, np.inf)
+        low, high = self.LIMITS.get(name, (0, high) if name == "seed" else (low, high))
+        numbers = not choices or name in self.LIMITS
+        hint = [f"one of {', '.join(choices)}"] * bool(choices)
+        hint += [f"{'a whole number' if whole else 'a number'} from {low:g} to {high:g}"] * numbers
+        values = list(value) if several and isinstance(value, (tuple, list)) else [value]
+        for each in values:
+            if isinstance(each, str):
+                right = each in choices
+            else:
+                number = isinstance(each, Integral if whole else Real) and not isinstance(each, bool)
+                right = numbers and number and np.isfinite(float(each)) and low <= float(each) <= high
+            if not right:
+                raise InputError(f"{self.name}: {name} {value!r}; give {' or '.join(hint)}")
+        if not values:
+            raise InputError(f"{self.name}: {name} is empty; give at least one")
 
     @property
     def memory_bytes(self) -> int:
@@ -157,13 +168,10 @@ class Model(ABC):
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}
 
     def _here(self, tensor: torch.Tensor) -> torch.Tensor:
-        """The tensor on this model's device. Raises InputError where there is no such device."""
-        try:
-            return tensor.to(self.device)
-        except (RuntimeError, AssertionError, NotImplementedError) as error:
-            raise InputError(f"device {self.device!r} cannot be used here ({str(error).splitlines()[0]})") from error
+        return tensor.to(self.device)
 
-    def _check_fit(self, shape: tuple[int, int], learned: Learned) -> None:
+    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
+        """Raise InputError where a model with these parameters cannot have learned this from views of `shape`."""
         expected = self._shapes(*shape)
         if learned.keys() != expected.keys():
             raise InputError(f"{self.name}: it learns {', '.join(expected)}, not {', '.join(learned) or 'nothing'}")
@@ -221,6 +229,14 @@ class IncrementalModel(Model):
     @abstractmethod
     def _add(self, learned: Learned, views: Images) -> Learned:
         """`learned`, which stays as it is, with views added one after the other."""
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that torch cannot use here. Raises InputError."""
+    try:
+        torch.zeros(1, device=device).item()
+    except (RuntimeError, AssertionError, NotImplementedError, TypeError) as error:
+        raise InputError(f"device {device!r} cannot be used here ({str(error).splitlines()[0]})") from error
 
 
 def check_training(views: Images) -> None:

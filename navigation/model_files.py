@@ -17,7 +17,7 @@ from world.errors import InputError
 from world.files import replacing
 
 from .encoding import Encoding
-from .familiarity import Model
+from .familiarity import Model, check_device
 from .models import make_model
 
 HEADER, VERSION = "tussock", 1
@@ -43,6 +43,10 @@ def save_model(
     """
     if model.shape is None:
         raise InputError(f"{path}: this model has learned nothing yet; fit it before it is saved")
+    model.check_learned(model.shape, model.learned)
+    snapshots = model.learned.get("snapshots")
+    if poses is not None and snapshots is not None and len(poses) != len(snapshots):
+        raise InputError(f"{path}: {len(poses)} poses for {len(snapshots)} snapshots; give the pose of each, or none")
     device_free = {key: value for key, value in model.parameters.items() if key != "device"}
     header = {
         "version": VERSION, "model": model.name, "parameters": device_free, "shape": model.shape,
@@ -52,7 +56,7 @@ def save_model(
     if poses is not None:
         tensors["poses"] = torch.tensor(poses)
     with replacing(path) as partial:
-        partial.write_bytes(save(tensors, {HEADER: json.dumps(header)}))
+        partial.write_bytes(save(tensors, {HEADER: json.dumps(header, default=lambda number: number.item())}))
 
 
 def first_line(error: Exception) -> str:
@@ -81,6 +85,7 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
         )
     if expect is not None and header.get("model") != expect:
         raise InputError(f"{path} holds a model {header.get('model')!r}, not {expect!r}")
+    check_device(device)
     poses = tensors.pop("poses", None)
     learned = {key.removeprefix("learned."): tensor for key, tensor in tensors.items()}
     try:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from .encoding import Encoding
     from .familiarity import Model
+    from .model_files import SavedModel
 
 WORLD = (
     "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
@@ -143,28 +144,23 @@ class LearningOptions(RouteOptions):
 
     def prepare(self) -> "Lesson":
         """Everything that a model is to learn, and everything that can be refused before long work begins."""
+        from .familiarity import check_device
         from .models import make_model
         from .training import training_poses
 
-        if self.model.endswith(FILE_SUFFIX):
-            model, encoding, known = self._open_model()
-        else:
-            model, encoding, known = (
-                make_model(self.model, seed=self.seed, device=self.device),
-                self.chosen_encoding(),
-                None,
-            )
+        check_device(self.device)
+        saved = self._open_model() if self.model.endswith(FILE_SUFFIX) else None
+        model = make_model(self.model, seed=self.seed, device=self.device) if saved is None else saved.model
+        encoding = self.chosen_encoding() if saved is None or saved.encoding is None else saved.encoding
         world, route = self.open_route()
         views = route.resampled(self.spacing_m)
         poses = training_poses(views, every=self.every, learning_walk=self.learning_walk_m, field=world.field)
         return Lesson(
-            world=world, route=route, route_views=views, poses=poses, encoding=encoding, model=model, known=known
+            world=world, route=route, route_views=views, poses=poses, encoding=encoding, model=model, saved=saved
         )
 
-    def _open_model(self) -> tuple["Model", "Encoding", "np.ndarray"]:
-        """A model from a file, its encoding, and the poses of the views it knows. Refuses flags that say otherwise."""
-        import numpy as np
-
+    def _open_model(self) -> "SavedModel":
+        """A model from a file. Refuses flags that say otherwise than it."""
         from .model_files import load_model
 
         saved = load_model(self.model, device=self.device)
@@ -176,14 +172,13 @@ class LearningOptions(RouteOptions):
                     f"{self.model} learned through another eye ({saved.eye}) than the flags ask for ({self.eye()}); "
                     "give the same --size, --samples, --eye-height-m, --top-deg and --bottom-deg, or none"
                 )
-        unsaid = self.encoding is None and self.resize is None and self.blur == 0
-        encoding = saved.encoding if unsaid and saved.encoding is not None else self.chosen_encoding()
-        if saved.encoding is not None and encoding != saved.encoding:
+        said = not (self.encoding is None and self.resize is None and self.blur == 0)
+        if said and saved.encoding is not None and self.chosen_encoding() != saved.encoding:
             raise InputError(
-                f"{self.model} learned views encoded as {str(saved.encoding)!r}, the flags ask for {str(encoding)!r}; "
-                "leave out --encoding, --resize and --blur"
+                f"{self.model} learned views encoded as {str(saved.encoding)!r}, the flags ask for "
+                f"{str(self.chosen_encoding())!r}; leave out --encoding, --resize and --blur"
             )
-        return saved.model, encoding, np.empty((0, 3)) if saved.poses is None else saved.poses
+        return saved
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +186,7 @@ class Lesson:
     """A world, a route through it, and what is to be learned there.
 
     route_views: the route's poses at the spacing of its views. poses: (n, 3) all that views are learned from.
-    known: poses (m, 3) of the views the model knows already, because it comes from a file; None if it has yet to learn.
+    saved: the file that the model comes from, if it does; then it has learned.
     """
 
     world: "World"
@@ -200,14 +195,14 @@ class Lesson:
     poses: "np.ndarray"
     encoding: "Encoding"
     model: "Model"
-    known: "np.ndarray | None"
+    saved: "SavedModel | None"
 
-    def teach(self, renderer: "Renderer") -> "np.ndarray":
-        """Train the model, showing progress, unless it comes from a file; return the poses of the views it knows."""
+    def teach(self, renderer: "Renderer") -> "np.ndarray | None":
+        """Train the model, showing progress, unless it comes from a file; return the poses of the views it knows, if known."""
         from .training import learn
 
         say(f"renderer: {renderer.backend}")
-        if self.known is not None:
-            return self.known
+        if self.saved is not None:
+            return self.saved.poses
         with progress("learning", "views") as report:
             return learn(self.model, self.encoding, renderer, self.poses, report)

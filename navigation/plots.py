@@ -1,6 +1,7 @@
 """Pictures for people. The only module that imports matplotlib."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -11,12 +12,13 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from world.files import replacing
-from world.geometry import Route
+from world.geometry import Route, turn_of_columns, wrap_angle
 from world.scene import World
 
 matplotlib.rcParams.update({"font.family": "DejaVu Sans", "font.size": 9})
 
 ROUTE_COLOUR, PATH_COLOUR = "#2f6bff", "#e6352b"
+CURVE_COLOUR = "#333333"
 
 
 def draw_world(axes: Axes, world: World) -> None:
@@ -65,3 +67,38 @@ def overview(
     axes.set_title(title)
     with replacing(path) as partial:
         figure.savefig(partial, dpi=120, format=Path(path).suffix.lstrip(".").lower())
+
+
+def familiarity_curves(
+    path: str | os.PathLike, scans: Sequence[tuple[str, Float[np.ndarray, " w"], float]], *, title: str = ""
+) -> None:
+    """Write a picture (.png or .svg) of how familiar one model finds every heading, a panel a place.
+
+    scans: for each place its name, the familiarity of each rotation, and how far to the left of the route's heading the eye
+    faced (rad). In the picture the route's heading is 0. title: comes before the places' names.
+    """
+    from .rotation import best_turn  # late: it loads torch, which a picture of a world does not need
+
+    with matplotlib.rc_context({"font.size": 11, "axes.titlesize": 11}):
+        figure = Figure(figsize=(8, 2.3), layout="constrained")
+        panels = figure.subplots(1, len(scans), sharey=True, squeeze=False)[0]
+        for axes, (place, familiarity, facing) in zip(panels, scans, strict=True):
+            width = len(familiarity)
+            headings = np.degrees(wrap_angle(facing + turn_of_columns(np.arange(width), width)))
+            order = headings.argsort()
+            x, y = headings[order], familiarity[order]
+            axes.plot(np.r_[x[-1] - 360, x, x[0] + 360], np.r_[y[-1], y, y[0]], color=CURVE_COLOUR, lw=1.4)
+            error = float(np.degrees(wrap_angle(facing + best_turn(familiarity[None])[0])))
+            axes.axvline(0, color=ROUTE_COLOUR, lw=1)
+            axes.plot(error, y.max(), "o", color=PATH_COLOUR, ms=7, mec="white", zorder=3)
+            words = f"{abs(error):.0f} degree{'' if round(abs(error)) == 1 else 's'} off"
+            corner, align = (0.02, "left") if error > 45 else (0.99, "right")  # away from the dot
+            axes.text(corner, 1, words, color=PATH_COLOUR, ha=align, va="top", transform=axes.transAxes)
+            axes.set(xlim=(-180, 180), xticks=range(-180, 181, 90), title=f"{title} {place}".strip())
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.margins(y=0.2)
+        panels[0].set_ylabel("familiarity")
+        figure.supxlabel("degrees to the left of the route's heading (negative: to the right)", fontsize=11)
+        figure.get_layout_engine().set(wspace=0.06)  # type: ignore[union-attr]
+        with replacing(path) as partial:
+            figure.savefig(partial, dpi=120, format=Path(path).suffix.lstrip(".").lower())

@@ -193,7 +193,7 @@ def test_a_trained_model_goes_on_learning_in_constant_memory(capfd, tmp_path, tr
     code, printed, _ = tussock(capfd, *go_on, "--out", tmp_path / "both.safetensors", "--json")
     assert code == 0
     result = json.loads(printed)
-    assert result["n_views"] > 50
+    assert result["n_views"] > 40
     assert result["model"] == "infomax"
     assert result["memory_bytes"] == load_model(trained).model.memory_bytes
     tussock(capfd, "train", *SMALL, "--model", "rbm", "--out", tmp_path / "rbm.safetensors")

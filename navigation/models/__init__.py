@@ -74,5 +74,5 @@ def make_model(name: str, **parameters) -> Model:
     if name.startswith(OPPONENT):
         from .opponent import opponent
 
-        return opponent(make_model(name.removeprefix(OPPONENT), **parameters))
+        return opponent(model_class(name.removeprefix(OPPONENT))(**parameters))
     return model_class(name)(**parameters)

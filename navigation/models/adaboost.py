@@ -1,6 +1,5 @@
 """AdaBoost over Haar-like filters: the few of many random features that tell the route from turned views."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple, no_type_check
@@ -45,7 +44,7 @@ class AdaBoost(Model):
 
     def _learn(self, views: Images) -> Learned:
         width = views.shape[2]
-        pool = haar_filters(self.pool, views.shape[1], width, np.random.default_rng(self.seed)).to(self.device)
+        pool = self._here(haar_filters(self.pool, views.shape[1], width, np.random.default_rng(self.seed)))
         turns = [round(degrees / 360 * width) for degrees in self.negatives_deg]
         negatives = torch.cat([torch.roll(views, turn, dims=-1) for turn in turns])
         learned = self._boost(pool, views, negatives)
@@ -61,11 +60,12 @@ class AdaBoost(Model):
         samples = torch.cat([positives, negatives]).flatten(start_dim=1)
         labels = np.repeat([1.0, -1.0], [len(positives), len(negatives)])
         responses = (pool.flatten(start_dim=1) @ samples.T).cpu().numpy()  # (pool, samples)
-        shares = np.linspace(0, 1, THRESHOLDS + 2)[1:-1]
-        thresholds = np.sort(responses, axis=1)[:, (shares * (responses.shape[1] - 1)).astype(int)]
-        bins = np.stack([np.searchsorted(*pair) for pair in zip(thresholds, responses, strict=True)]).astype(np.uint8)
+        thresholds = np.stack([thresholds_between(row) for row in responses])
+        bins = np.stack([
+            np.searchsorted(*pair).astype(np.uint8) for pair in zip(thresholds, responses, strict=True)
+        ])  # fmt: skip
         weights = np.where(labels > 0, 0.5 / len(positives), 0.5 / len(negatives))
-        chosen, cuts, weight = [], [], []
+        chosen, cuts, cast = [], [], []
         for _ in range(self.features):
             stump = best_stump(bins, weights * labels)
             error = np.clip(stump.error, 1e-6, 1 - 1e-6)
@@ -75,11 +75,11 @@ class AdaBoost(Model):
             weights /= weights.sum()
             chosen.append(stump.filter)
             cuts.append(thresholds[stump.filter, stump.bin])
-            weight.append(vote * stump.sign)
+            cast.append(vote * stump.sign)
         return {
             "filters": pool[chosen],
-            "cuts": torch.tensor(np.array(cuts)),
-            "votes": torch.tensor(weight, dtype=torch.float32),
+            "cuts": self._here(torch.tensor(np.array(cuts))),
+            "votes": self._here(torch.tensor(cast, dtype=torch.float32)),
         }
 
     def _mistaken(self, views: Images, learned: Learned) -> Float32[torch.Tensor, "m h w"]:
@@ -120,6 +120,18 @@ class Stump(NamedTuple):
     error: float
 
 
+def thresholds_between(responses: Float32[np.ndarray, " samples"]) -> Float32[np.ndarray, " thresholds"]:
+    """Quantiles, each moved midway to the next larger response.
+
+    Views have flat patches, of which a filter makes 0 but for rounding: a threshold on a response would leave the answer to chance.
+    """
+    ordered = np.sort(responses)
+    gap = 1e-5 * float(np.abs(ordered).max())
+    below = ordered[(np.linspace(0, 1, THRESHOLDS + 2)[1:-1] * (len(ordered) - 1)).astype(int)]
+    above = ordered[np.searchsorted(ordered, below + gap, side="right").clip(max=len(ordered) - 1)]
+    return np.where(above > below + gap, (below + above) / 2, below + max(gap, 1e-6)).astype(np.float32)
+
+
 def best_stump(bins: UInt8[np.ndarray, "pool samples"], signed: Float64[np.ndarray, " samples"]) -> Stump:
     """The threshold unit with the least weighted error. signed: weights (summing to 1) times labels (1 and -1).
 
@@ -128,7 +140,7 @@ def best_stump(bins: UInt8[np.ndarray, "pool samples"], signed: Float64[np.ndarr
     weights = np.abs(signed)
     order = weights.argsort()
     heavy = np.sort(order[np.searchsorted(weights[order].cumsum(), NEGLIGIBLE) :])
-    parts = np.array_split(np.arange(len(bins)), os.cpu_count() or 1)
+    parts = np.array_split(np.arange(len(bins)), numba.get_num_threads())
     with ThreadPoolExecutor(len(parts)) as threads:
         found = list(
             threads.map(

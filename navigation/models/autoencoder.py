@@ -16,7 +16,7 @@ class Autoencoder(Model):
     v . r = h . W v + b . v and |r|^2 = h^T (W W^T) h + 2 h . W b + |b|^2. Trained by Adam. Constant memory.
 
     units: hidden ones. epochs: passes over the views. rate, batch_size: of Adam. noise: standard deviation of the noise added to
-    the views while training (denoising), in units of theirs.
+    the views while training (denoising), in theirs.
     """
 
     name = "autoencoder"
@@ -35,11 +35,12 @@ class Autoencoder(Model):
         weights = (torch.randn(self.units, inputs, generator=random) / inputs**0.5).to(self.device).requires_grad_()
         hidden = torch.zeros(self.units, device=self.device, requires_grad=True)
         visible = data.mean(dim=0).requires_grad_()
+        spread = data.std()
         optimiser = torch.optim.Adam([weights, hidden, visible], lr=self.rate)
         for _ in range(self.epochs):
             for batch in torch.randperm(len(data), generator=random).split(self.batch_size):
                 seen = data[batch.to(self.device)]
-                noisy = seen + self.noise * torch.randn(seen.shape, generator=random).to(self.device)
+                noisy = seen + self.noise * spread * torch.randn(seen.shape, generator=random).to(self.device)
                 rebuilt = torch.tanh(noisy @ weights.T + hidden) @ weights + visible
                 optimiser.zero_grad()
                 (rebuilt - seen).square().mean().backward()

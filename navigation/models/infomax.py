@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Float32
 
@@ -32,13 +33,14 @@ class Infomax(IncrementalModel):
     paper = "Baddeley et al. 2012"
 
     CHOICES = {"rate": RATES}  # noqa: RUF012
+    LIMITS = {"rate": (0.0, np.inf)}  # noqa: RUF012
     units: int | None = None
     rate: str | float = "z-scored"
     traversals: int = 1
 
     def _begin(self, height: int, width: int) -> Learned:
         inputs = height * width
-        weights = torch.randn(self.units or inputs, inputs, generator=self._random())
+        weights = self._here(torch.randn(self.units or inputs, inputs, generator=self._random()))
         deviation, mean = torch.std_mean(weights, dim=1, keepdim=True)
         return {"weights": ((weights - mean) / deviation).reshape(-1, height, width)}
 
@@ -58,7 +60,10 @@ class Infomax(IncrementalModel):
         self._bank = FilterBank(self.learned["weights"])
 
     def _scan(self, views: Images) -> Scans:
-        return -torch.stack([responses.abs().sum(dim=1) for _, responses in self._bank.chunks(views)]).sum(dim=0)
+        total = torch.zeros(len(views), views.shape[2], device=views.device)
+        for _, responses in self._bank.chunks(views):
+            total -= responses.abs().sum(dim=1)
+        return total
 
 
 def infomax_update(

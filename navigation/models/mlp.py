@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32, Float64
 from scipy.optimize import minimize
+from scipy.special import expit
 from sklearn.base import BaseEstimator, ClassifierMixin
 from torch.nn.functional import binary_cross_entropy_with_logits, linear
 
@@ -33,7 +34,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
     """Trained on each view (on the route) and on turned copies of it (off the route); familiarity is the log-odds of "on".
 
     Section 4.4 of the thesis. Parameters are scikit-learn's MLPClassifier's, with its defaults but for max_iter, and so is what
-    `fit(views, labels)`, `predict`, `predict_proba` and `get_params` do: GridSearchCV takes it. `fit(views)` makes the negatives.
+    `fit(views, y)`, `predict`, `predict_proba` and `get_params` do: GridSearchCV takes it. `fit(views)` makes the negatives.
     The log-odds order views as the probability does, but do not saturate. Constant memory.
 
     hidden_layer_sizes: units of each hidden layer. activation: identity, logistic, tanh or relu. solver: lbfgs, sgd or adam.
@@ -56,20 +57,20 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
     negatives_deg: tuple[float, ...] = (-60.0, 60.0)
     negatives_each: int = 1
 
-    def fit(self, views: Images | Float[np.ndarray, "n ..."], labels: Any = None) -> "MLP":
+    def fit(self, views: Images | Float[np.ndarray, "n ..."], y: Any = None) -> "MLP":
         """Train from scratch: on views (n, h, w) and the negatives made of them, or on views (n, h, w) or (n, pixels) and labels.
 
-        labels: (n,) of two different numbers, of which the larger stands for "on the route".
+        y: labels (n,) of two different numbers, of which the larger stands for "on the route".
         """
         images = as_images(views)
-        if labels is None:
+        if y is None:
             return super().fit(images)
         self.check_parameters()
         check_training(images)
-        found = np.asarray(labels)
-        classes = np.unique(found)
-        if len(found) != len(images):
-            raise InputError(f"{len(images)} views and {len(found)} labels; give each view one")
+        found = np.asarray(y)
+        if found.shape != (len(images),):
+            raise InputError(f"{len(images)} views and labels of shape {found.shape}; give each view one")
+        classes = np.unique(found) if found.dtype.kind in "biuf" else found
         if classes.dtype.kind not in "biuf" or not np.isfinite(classes).all() or len(classes) != 2:
             raise InputError(f"labels {classes[:4].tolist()}; give two different numbers")
         targets = torch.as_tensor(found == classes[1], dtype=torch.float32)
@@ -95,7 +96,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
     def predict_proba(self, views: Images | Float[np.ndarray, "n ..."]) -> Float[np.ndarray, "n 2"]:
         """Probability of each class for views as they are."""
-        second = 1 / (1 + np.exp(-self.decision_function(views).astype(float)))
+        second = expit(self.decision_function(views).astype(float))
         return np.column_stack([1 - second, second])
 
     def predict(self, views: Images | Float[np.ndarray, "n ..."]) -> np.ndarray:

@@ -21,7 +21,7 @@ class MLPMixture(MLPRotation):
     """
 
     name = "mlp-mixture"
-    paper = "the thesis, section 5 (future work); Jacobs et al. 1991"
+    paper = "the thesis, future work; Jacobs et al. 1991"
 
     stretches: int = 8
     units: int = 20

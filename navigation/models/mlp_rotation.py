@@ -22,7 +22,7 @@ class MLPRotation(Model):
     Constant memory.
 
     units: hidden ones. target_deg: standard deviation of the target. noise: standard deviation of the noise on the views, in
-    theirs. steps: of the training; None takes as many as there are views, at least 500. rate, batch_size, penalty (decoupled
+    theirs. steps: of the training; None takes half as many as there are views, at least 500. rate, batch_size, penalty (decoupled
     weight decay): of the training.
     """
 
@@ -35,7 +35,7 @@ class MLPRotation(Model):
     noise: float = 1.5
     steps: int | None = None
     rate: float = 5e-3
-    batch_size: int = 25
+    batch_size: int = 50
     penalty: float = 0.3
 
     def stretch_of(self, views: Images) -> Int64[torch.Tensor, " n"]:
@@ -46,7 +46,7 @@ class MLPRotation(Model):
         random = self._random()
         stretch = self.stretch_of(views)
         n, height, width = views.shape
-        steps = self.steps or max(500, n)
+        steps = self.steps or max(500, n // 2)
         networks = int(stretch.max()) + 1
         weights = torch.randn(networks * self.units, height, width, generator=random) / (height * width) ** 0.5
         biases = torch.zeros(networks * self.units)

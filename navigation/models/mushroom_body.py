@@ -31,9 +31,9 @@ class MushroomBody(IncrementalModel):
     columns: int = 36
     rows: int = 10
     cells: int = 20_000
-    inputs: int = 20
+    inputs: int = 40
     active: float = 0.003
-    depression: float = 0.5
+    depression: float = 0.8
     adaptation: float = 0.25
     smoothing_deg: float = 6.0
 
@@ -45,7 +45,7 @@ class MushroomBody(IncrementalModel):
     def _begin(self, height: int, width: int) -> Learned:
         neurons = self.columns * self.rows
         wiring = torch.rand(self.cells, neurons, generator=self._random()).topk(self.inputs, dim=1).indices
-        return {"wiring": wiring.sort(dim=1).values, "synapses": torch.ones(self.cells, device=self.device)}
+        return {"wiring": self._here(wiring.sort(dim=1).values), "synapses": torch.ones(self.cells, device=self.device)}
 
     def _add(self, learned: Learned, views: Images) -> Learned:
         synapses = learned["synapses"].clone()

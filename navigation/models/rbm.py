@@ -23,6 +23,7 @@ class RBM(Model):
     name = "rbm"
     paper = "Hinton 2002; Philippides et al. 2015"
 
+    LIMITS = {"momentum": (0.0, 0.999)}  # noqa: RUF012
     units: int = 200
     epochs: int = 50
     rate: float = 1e-3
