@@ -32,6 +32,7 @@ from navigation.models import (
 )
 from navigation.models.adaboost import best_stump, haar_filters
 from navigation.models.infomax import RATES, infomax_update
+from navigation.models.mlp_rotation import swayed
 from navigation.models.mushroom_body import receptive_fields
 from world.errors import InputError
 
@@ -609,3 +610,16 @@ def test_opponents_are_two_models_one_less_the_other(name, w):
     one, other = make_model(name, **settings).fit(learned), make_model(name, **settings).fit(away)
     assert torch.equal(both.scan(queries), one.scan(queries) - other.scan(queries))
     assert both.memory_bytes == one.memory_bytes + other.memory_bytes
+
+
+def test_swayed_views_shift_smoothly_around_the_ring_by_as_much_as_asked():
+    around = torch.arange(360) * (2 * np.pi / 360)
+    views = torch.stack([around.cos(), around.sin()]).expand(200, 2, 360)  # a column's angle can be read back from it
+    random = torch.Generator().manual_seed(0)
+    swayed_views = swayed(views, np.radians(10), random)
+    shift = torch.rad2deg(torch.atan2(swayed_views[:, 1], swayed_views[:, 0]) - around).remainder(360)
+    shift = torch.where(shift > 180, shift - 360, shift)
+    assert abs(float(shift.std()) - 10) < 0.7
+    assert abs(float(shift.mean())) < 0.7
+    assert (shift - shift.roll(1, dims=1)).abs().max() < 2.5  # degrees a column, the seam included
+    assert torch.equal(swayed(views, 0.0, random), views)

@@ -51,3 +51,6 @@ def test_the_examples_run(folder):
     for example in sorted((ROOT / "examples").glob("*.py")):
         done = subprocess.run([sys.executable, str(example)], cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, (example, done.stderr)
+        if "three_routes" in example.name:
+            assert done.stdout.count("arrived") == 3
+            assert len(set(re.findall(r"([\d,]+) bytes", done.stdout))) == 1

@@ -17,13 +17,13 @@ from ..rotation import FilterBank, bell
 class MLPRotation(Model):
     """One hidden layer of ReLU units whose output at all rotations of a view is a softmax: every wrong rotation is a negative.
 
-    The target is a Gaussian over the rotations about the learned heading, so that neighbours are nearly as good. Noise on the
-    views keeps a network with few views from learning them by heart. Trained by Adam; familiarity is the network's output.
+    The target is a Gaussian over the rotations about the learned heading, so that neighbours are nearly as good. While it learns,
+    views sway as from places nearby, and noise keeps it from learning them by heart. Familiarity is the network's output.
     Constant memory.
 
     units: hidden ones. target_deg: standard deviation of the target. noise: standard deviation of the noise on the views, in
-    theirs. steps: of the training; None takes half as many as there are views, at least 500. rate, batch_size, penalty (decoupled
-    weight decay): of the training.
+    theirs. sway_deg: standard deviation of the shift of their columns. steps: of the training, by Adam; None takes as many as
+    there are views, at least 500. rate, batch_size, penalty (decoupled weight decay): of the training.
     """
 
     name = "mlp-rotation"
@@ -33,6 +33,7 @@ class MLPRotation(Model):
     units: int = 100
     target_deg: float = 6.0
     noise: float = 1.5
+    sway_deg: float = 6.0
     steps: int | None = None
     rate: float = 5e-3
     batch_size: int = 50
@@ -46,7 +47,7 @@ class MLPRotation(Model):
         random = self._random()
         stretch = self.stretch_of(views)
         n, height, width = views.shape
-        steps = self.steps or max(500, n // 2)
+        steps = self.steps or max(500, n)
         networks = int(stretch.max()) + 1
         weights = torch.randn(networks * self.units, height, width, generator=random) / (height * width) ** 0.5
         biases = torch.zeros(networks * self.units)
@@ -60,7 +61,7 @@ class MLPRotation(Model):
         schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: warmth(step / steps))
         for batch in islice(batches(n, self.batch_size, random), steps):
             noise = self._here(torch.randn(len(batch), height, width, generator=random))
-            seen = views[self._here(batch)] + self.noise * spread * noise
+            seen = swayed(views[self._here(batch)], math.radians(self.sway_deg), random) + self.noise * spread * noise
             outputs = network_outputs(FilterBank(weights), biases, output, seen)  # (n, networks, w)
             chances = log_softmax(outputs.flatten(start_dim=1), dim=1).reshape(outputs.shape)
             right = chances[torch.arange(len(batch)), stretch[batch]]
@@ -82,6 +83,24 @@ class MLPRotation(Model):
 
     def _scan(self, views: Images) -> Scans:
         return self._outputs(views)[:, 0]
+
+
+def swayed(views: Images, deviation: float, random: torch.Generator) -> Images:
+    """Views whose columns are shifted by a smooth random amount each, as they are where the eye stands a little beside.
+
+    The shift (rad) is a sum of three waves around the circle, of random size and phase: what is near moves against what lies
+    ahead and behind. Its standard deviation over columns and views is `deviation`. The same generator shifts all devices alike.
+    """
+    n, _, width = views.shape
+    around = torch.arange(width) * (2 * math.pi / width)
+    shift = torch.zeros(n, width)
+    for wave in (1, 2, 3):
+        size = torch.randn(n, 2, generator=random) * (deviation / math.sqrt(3))
+        shift += size[:, :1] * torch.sin(wave * around) + size[:, 1:] * torch.cos(wave * around)
+    at = torch.arange(width) + shift * (width / (2 * math.pi))
+    column, share = at.floor().long().to(views.device), (at - at.floor()).to(views.device)[:, None]
+    here, next_ = ((column + step).remainder(width)[:, None].expand(views.shape) for step in (0, 1))
+    return views.gather(2, here) * (1 - share) + views.gather(2, next_) * share
 
 
 def batches(n: int, size: int, random: torch.Generator) -> Iterator[torch.Tensor]:
