@@ -6,7 +6,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from typing import Any
+from typing import Annotated, Any, Union
 
 import tyro
 
@@ -25,6 +25,7 @@ from .commands import (
 )
 from .terminal import say, show
 
+# A command by its name, or a sentence and the commands that go under one name.
 COMMANDS: dict[str, Any] = {
     "world": WorldCommand,
     "view": ViewCommand,
@@ -40,8 +41,9 @@ COMMANDS: dict[str, Any] = {
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 130 when interrupted."""
-    command = tyro.extras.subcommand_cli_from_dict(
-        COMMANDS, prog="tussock", args=arguments, config=(tyro.conf.FlagCreatePairsOff,),
+    command = tyro.cli(
+        choice_of(COMMANDS), prog="tussock", args=arguments,
+        config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
         description="Insect visual route navigation: grow a world, look around in it, learn a route, walk it home.",
     )  # fmt: skip
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
@@ -65,6 +67,27 @@ def main(arguments: list[str] | None = None) -> None:
     except KeyboardInterrupt:
         say("tussock: interrupted")
         sys.exit(130)
+
+
+def choice_of(commands: dict[str, Any]) -> Any:
+    """The type, as tyro reads it, of one of several commands."""
+
+    def group(sentence: str, below: dict[str, Any]) -> Any:
+        def chosen(command: Any) -> Any:
+            return command
+
+        chosen.__doc__, chosen.__annotations__ = (
+            sentence,
+            {"command": Annotated[choice_of(below), tyro.conf.arg(name="")]},
+        )
+        return chosen
+
+    return Union[  # noqa: UP007 (made from a list)
+        tuple(
+            Annotated[Any, tyro.conf.subcommand(name, constructor=group(*each) if isinstance(each, tuple) else each)]
+            for name, each in commands.items()
+        )
+    ]
 
 
 @contextmanager

@@ -5,15 +5,14 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from jaxtyping import Float
 
 from render.renderer import Renderer
-from world.geometry import Route, wrap_angle
+from world.geometry import Route
 
 from .agent import ARRIVED, Agent
 from .encoding import Encoding
-from .evaluation import BATCH, HeadingErrors, nearest_view, recovered_headings, views_east
+from .evaluation import errors_on, views_east
 from .familiarity import Model
 from .training import training_poses, training_views
 
@@ -49,23 +48,14 @@ def compare_models(
     on_route, _ = training_views(encoding, renderer, training_poses(route_views, every=every))
     poses = training_poses(route_views, every=every, learning_walk=learning_walk, field=field)
     beside, _ = training_views(encoding, renderer, poses)
-    parts = [positions[start : start + BATCH] for start in range(0, len(positions), BATCH)]
-    seen = torch.cat([views_east(encoding, renderer, part) for part in parts])
-    nearest = nearest_view(route_views, positions)
-    wanted = route_views.poses[nearest, 2]
+    seen = list(views_east(encoding, renderer, positions))
     for make in models:
         model = make()
         began = time.perf_counter()
         model.fit(on_route)
         fitted = time.perf_counter()
-        headings = np.concatenate([
-            recovered_headings(model, part, centre)
-            for part, centre in zip(seen.split(BATCH), np.array_split(wanted, range(BATCH, len(wanted), BATCH)), strict=True)
-        ])  # fmt: skip
+        found = errors_on(model, seen, route_views, positions)
         scanned = time.perf_counter()
-        found = HeadingErrors(
-            positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted))
-        )
         walker = make().fit(beside)
         agent = Agent(renderer=renderer, encoding=encoding, model=walker, route=route, seed=seed)
         *_, last = agent.walk(agent.start(offset))

@@ -1,9 +1,11 @@
 """How well a model recovers headings: pure functions from worlds and models to numbers."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+import torch
+from jaxtyping import Float, Float32
 
 from render.renderer import Renderer
 from world.errors import InputError
@@ -68,9 +70,16 @@ def nearest_view(route: Route, positions: Float[np.ndarray, "n 2"]) -> np.ndarra
     return np.hypot(*(positions[:, None] - route.xy).transpose(2, 0, 1)).argmin(axis=1)
 
 
-def views_east(encoding: Encoding, renderer: Renderer, positions: Float[np.ndarray, "n 2"]) -> Images:
-    """What is seen at each position, encoded. All face east, so that the answer is not on the grid of rotations by construction."""
-    return encoding(renderer.render(np.column_stack([positions, np.zeros(len(positions))])))
+def views_east(
+    encoding: Encoding, renderer: Renderer, positions: Float[np.ndarray, "n 2"]
+) -> Iterator[Float32[torch.Tensor, "m h w"]]:
+    """What is seen at the positions, encoded, in batches.
+
+    All views face east, so that the answer is not on the grid of rotations by construction.
+    """
+    for start in range(0, len(positions), BATCH):
+        part = positions[start : start + BATCH]
+        yield encoding(renderer.render(np.column_stack([part, np.zeros(len(part))])))
 
 
 def recovered_headings(
@@ -90,13 +99,23 @@ def heading_errors(
 
     scan: width of the scan (rad), about the set heading where it is not full. progress(done, total) is called now and then.
     """
+    return errors_on(model, views_east(encoding, renderer, positions), route, positions, scan=scan, progress=progress)
+
+
+def errors_on(
+    model: FamiliarityModel, views: Iterable[Images], route: Route, positions: Float[np.ndarray, "n 2"],
+    *, scan: float = 2 * np.pi, progress=lambda done, total: None,
+) -> HeadingErrors:  # fmt: skip
+    """`heading_errors` from encoded views at the positions that face east, in batches."""
     nearest = nearest_view(route, positions)
     wanted = route.poses[nearest, 2]
-    headings = np.empty(len(positions))
-    for start in range(0, len(positions), BATCH):
-        part = slice(start, start + BATCH)
-        headings[part] = recovered_headings(model, views_east(encoding, renderer, positions[part]), wanted[part], scan)
-        progress(min(start + BATCH, len(positions)), len(positions))
+    found = [np.empty(0)]
+    done = 0
+    for batch in views:
+        found.append(recovered_headings(model, batch, wanted[done : done + len(batch)], scan))
+        done += len(batch)
+        progress(done, len(positions))
+    headings = np.concatenate(found)
     return HeadingErrors(
         positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted))
     )
