@@ -84,12 +84,33 @@ class Resize:
 
     def __call__(self, images: Images) -> Float32[np.ndarray, "n rows columns"]:
         n, height, width = images.shape
-        h, w = max(1, round(height / self.factor)), max(4, round(width / self.factor))
+        h, w = reduced(height, width, self.factor)
         if (h, w) == (height, width) or n == 0:
             return images[:, :h, :w]
         if height % h == 0 and width % w == 0:
             return images.reshape(n, h, height // h, w, width // w).mean(axis=(2, 4), dtype=np.float32)
         return np.stack([cv2.resize(image, (w, h), interpolation=cv2.INTER_AREA) for image in images])
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Bilinear samples `factor` pixels apart, nothing averaged before: fine things alias, as in cv2.resize by default.
+
+    The thesis resized its views so. Width and height as `Resize` makes them.
+    """
+
+    factor: float
+    word: ClassVar[str] = "sample"
+
+    def __post_init__(self):
+        if not 1 <= self.factor <= 1000:
+            raise InputError(f"sample {self.factor:g}: give a factor from 1 (as it is) up to 1000")
+
+    def __call__(self, images: Images) -> Float32[np.ndarray, "n rows columns"]:
+        h, w = reduced(images.shape[1], images.shape[2], self.factor)
+        if (h, w) == images.shape[1:] or len(images) == 0:
+            return images[:, :h, :w]
+        return np.stack([cv2.resize(image, (w, h), interpolation=cv2.INTER_LINEAR) for image in images])
 
 
 @dataclass(frozen=True)
@@ -114,9 +135,14 @@ class Normalise:
         return centred / np.where(deviation > 1e-6, deviation, np.inf)
 
 
-Filter = Grey | SkyMask | Blur | Resize | VerticalEdges | Normalise
+def reduced(height: int, width: int, factor: float) -> tuple[int, int]:
+    """Rows and columns of an image reduced by `factor`."""
+    return max(1, round(height / factor)), max(4, round(width / factor))
+
+
+Filter = Grey | SkyMask | Blur | Resize | Sample | VerticalEdges | Normalise
 SOURCES: dict[str, type[Filter]] = {step.word: step for step in (Grey, SkyMask)}
-FILTERS: dict[str, type[Filter]] = {step.word: step for step in (Blur, Resize, VerticalEdges, Normalise)}
+FILTERS: dict[str, type[Filter]] = {step.word: step for step in (Blur, Resize, Sample, VerticalEdges, Normalise)}
 PRESETS = {
     "grey": "grey | {blur}{resize}",
     "sky": "sky-mask | {blur}{resize}normalise",

@@ -83,12 +83,17 @@ def views_east(
 
 
 def recovered_headings(
-    model: FamiliarityModel, views: Images, wanted: Float[np.ndarray, " n"], scan: float = 2 * np.pi
-) -> Float[np.ndarray, " n"]:
-    """The most familiar headings (rad) at places whose views face east; a scan under 2 pi wide is centred on the wanted ones."""
+    model: FamiliarityModel, views: Images, facing: Float[np.ndarray, " n"], *, scan: float = 2 * np.pi,
+    about: Float[np.ndarray, " n"] | None = None,
+) -> Float[np.ndarray, " n"]:  # fmt: skip
+    """The most familiar headings (rad) at places whose views were taken facing `facing`.
+
+    scan: width of the scan (rad), centred on the headings `about`, which a full one does not need.
+    """
     familiarity = model.scan(views).cpu().numpy()
-    windows = np.stack([scan_window(familiarity.shape[1], scan, centre) for centre in wanted])
-    return best_turn(familiarity, windows)
+    turns = np.zeros(len(facing)) if about is None else wrap_angle(about - facing)
+    windows = np.stack([scan_window(familiarity.shape[1], scan, turn) for turn in turns])
+    return wrap_angle(facing + best_turn(familiarity, windows))
 
 
 def heading_errors(
@@ -99,23 +104,24 @@ def heading_errors(
 
     scan: width of the scan (rad), about the set heading where it is not full. progress(done, total) is called now and then.
     """
-    return errors_on(model, views_east(encoding, renderer, positions), route, positions, scan=scan, progress=progress)
+    poses = np.column_stack([positions, np.zeros(len(positions))])
+    wanted = route.poses[nearest_view(route, positions), 2]
+    views = views_east(encoding, renderer, positions)
+    return errors_on(model, views, route, poses, scan=scan, about=wanted, progress=progress)
 
 
 def errors_on(
-    model: FamiliarityModel, views: Iterable[Images], route: Route, positions: Float[np.ndarray, "n 2"],
-    *, scan: float = 2 * np.pi, progress=lambda done, total: None,
+    model: FamiliarityModel, views: Iterable[Images], route: Route, poses: Float[np.ndarray, "n 3"],
+    *, scan: float = 2 * np.pi, about: Float[np.ndarray, " n"] | None = None, progress=lambda done, total: None,
 ) -> HeadingErrors:  # fmt: skip
-    """`heading_errors` from encoded views at the positions that face east, in batches."""
-    nearest = nearest_view(route, positions)
-    wanted = route.poses[nearest, 2]
-    found = [np.empty(0)]
-    done = 0
+    """`heading_errors` from encoded views, in batches, that were taken at poses; see `recovered_headings` for the scan."""
+    found, done = [np.empty(0)], 0
     for batch in views:
-        found.append(recovered_headings(model, batch, wanted[done : done + len(batch)], scan))
-        done += len(batch)
-        progress(done, len(positions))
-    headings = np.concatenate(found)
-    return HeadingErrors(
-        positions=positions, headings=headings, nearest=nearest, errors=np.abs(wrap_angle(headings - wanted))
-    )
+        part = slice(done, done + len(batch))
+        about_here = None if about is None else about[part]
+        found.append(recovered_headings(model, batch, poses[part, 2], scan=scan, about=about_here))
+        done = part.stop
+        progress(done, len(poses))
+    headings, nearest = np.concatenate(found), nearest_view(route, poses[:, :2])
+    errors = np.abs(wrap_angle(headings - route.poses[nearest, 2]))
+    return HeadingErrors(positions=poses[:, :2], headings=headings, nearest=nearest, errors=errors)

@@ -17,6 +17,7 @@ CHAINS = [
     "sky-mask",
     "grey | blur 1.5",
     "grey | resize 3",
+    "grey | sample 3",
     "sky-mask | vertical-edges",
     "grey | normalise",
     "sky-mask | blur 2 | vertical-edges | resize 3 | normalise",
@@ -32,7 +33,7 @@ def views():
 @pytest.mark.parametrize("chain", CHAINS)
 def test_rolling_the_view_rolls_the_features(views, chain):
     encoding = Encoding.parse(chain)
-    step = 3 if "resize" in chain else 1
+    step = 3 if "3" in chain else 1
     rolled = encoding(np.roll(views, 5 * step, axis=2)).numpy()
     assert np.allclose(rolled, np.roll(encoding(views).numpy(), 5, axis=2), atol=1e-5)
 
@@ -51,6 +52,12 @@ def test_a_batch_equals_its_views_one_by_one(views, chain):
 def test_grey_is_opencvs_grey(views):
     theirs = np.stack([cv2.cvtColor(np.ascontiguousarray(view[..., :3]), cv2.COLOR_RGB2GRAY) for view in views])
     assert np.abs(Encoding.parse("grey")(views).numpy() * 255 - theirs).max() < 1.01
+
+
+def test_samples_are_opencvs_default_resize(views):
+    grey = Encoding.parse("grey")(views).numpy()
+    theirs = np.stack([cv2.resize(image, (30, 8)) for image in grey])
+    assert np.array_equal(Encoding.parse("grey | sample 4")(views).numpy(), theirs)
 
 
 def test_sky_mask_is_alpha_and_its_estimate_from_colours_is_close(views):
