@@ -23,6 +23,7 @@ from .commands import (
     ViewCommand,
     WorldCommand,
 )
+from .database_commands import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
 from .terminal import say, show
 
 # A command by its name, or a sentence and the commands that go under one name.
@@ -36,11 +37,15 @@ COMMANDS: dict[str, Any] = {
     "models": ModelsCommand,
     "run": RunCommand,
     "play": PlayCommand,
+    "database": (
+        "Draw image databases in the BoB format, and look for what is wrong with them.",
+        {"grid": DatabaseGridCommand, "route": DatabaseRouteCommand, "check": DatabaseCheckCommand},
+    ),
 }
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit with 2 and one line for bad input, 130 when interrupted."""
+    """Run the command line; exit with 2 and one line for bad input, 1 when a check finds something, 130 when interrupted."""
     command = tyro.cli(
         choice_of(COMMANDS), prog="tussock", args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
@@ -53,7 +58,10 @@ def main(arguments: list[str] | None = None) -> None:
                 result = command.run()
             print(json.dumps(result), flush=True)
         else:
-            show(command.run())
+            result = command.run()
+            show(result)
+        if result.get("ok") is False:  # what was to be checked is not as it should be
+            sys.exit(1)
     except InputError as error:
         fail(str(error))
     except OSError as error:

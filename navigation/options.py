@@ -90,11 +90,33 @@ class SightOptions:
 
 
 @dataclass
-class RouteOptions(SightOptions):
-    """Along which route views are learned, and what is kept of them."""
+class PathOptions(SightOptions):
+    """What world is seen, through what eye, and a route through it."""
 
     route: Path | None = None
     """A route file (.csv or AntWorld .bin); without it a route of about 8 m is generated."""
+
+    def open_route(self) -> tuple["World", "Route"]:
+        """The world, and the route through it."""
+        from world.files import read_route
+        from world.walk import generate_route
+
+        route = read_route(self.route) if self.route else None
+        world = self.open_world()
+        route = route or generate_route(world, self.seed)
+        inside = world.field.contains(*route.xy.T)
+        if not inside.all():
+            x, y = route.xy[~inside][0]
+            raise InputError(
+                f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
+            )
+        return world, route
+
+
+@dataclass
+class RouteOptions(PathOptions):
+    """Along which route views are learned, and what is kept of them."""
+
     encoding: str | None = None
     """edges (the default), grey or sky; or a chain of steps, such as 'sky-mask | vertical-edges | resize 6 | normalise'."""
     resize: float | None = None
@@ -117,22 +139,6 @@ class RouteOptions(SightOptions):
         name = self.encoding or "edges"
         automatic = 1.0 if "|" in name else max(1.0, self.width_and_height()[0] / 120)
         return Encoding.named(name, resize=automatic if self.resize is None else self.resize, blur=self.blur)
-
-    def open_route(self) -> tuple["World", "Route"]:
-        """The world, and the route through it."""
-        from world.files import read_route
-        from world.walk import generate_route
-
-        route = read_route(self.route) if self.route else None
-        world = self.open_world()
-        route = route or generate_route(world, self.seed)
-        inside = world.field.contains(*route.xy.T)
-        if not inside.all():
-            x, y = route.xy[~inside][0]
-            raise InputError(
-                f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
-            )
-        return world, route
 
 
 @dataclass

@@ -28,11 +28,14 @@ def progress(what: str, unit: str) -> Iterator[Callable[[int, int], object]]:
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print a result for people: a line a value, and a table where a value is rows of further values."""
+    """Print a result for people: a line a value, a line a row where a value is a list of rows, a table where the rows have names."""
     width = max(map(len, result))
     for key, value in result.items():
         if isinstance(value, dict):
             show_table(key, value)
+        elif isinstance(value, list):
+            for row in value:
+                print("  ".join(map(text, row.values())))
         else:
             print(f"{key:<{width}}  {text(value)}")
 

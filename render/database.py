@@ -85,18 +85,18 @@ class Database:
         folder = Path(folder)
         names = dict.fromkeys(name for name in self.names if name is not None)
         for name in names:
-            if not (self.folder / name).is_file():
+            if not os.path.isfile(self.folder / name):
                 raise InputError(
                     f"there is no image {self.folder / name}; tussock database check lists what is missing"
                 )
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder} is there already and not empty; give a new folder")
         make_folder(folder)
+        write_metadata(folder / METADATA, self.metadata)
         for name in names:
             make_folder((folder / name).parent)
             with replacing(folder / name) as partial:
                 partial.write_bytes((self.folder / name).read_bytes())
-        write_metadata(folder / METADATA, self.metadata)
         write_entries(folder / ENTRIES, self.columns)
         return read_database(folder)
 
@@ -143,14 +143,14 @@ def leaves(folder: Path, name: str) -> bool:
 
 def read_image(path: Path) -> UInt8[np.ndarray, "height width channels"]:
     """An image as RGB or RGBA. Raises InputError where it is missing or cannot be read to its end."""
-    if not path.is_file():
+    if not os.path.isfile(path):  # False for names too long, too
         raise InputError(f"there is no image {path}; tussock database check lists what is missing")
-    data = path.read_bytes()
     try:
+        data = path.read_bytes()
         # libpng complains to standard error of what does not end as it should.
         whole = len(data) > 0 and (data[1:4] != b"PNG" or b"IEND" in data[-12:])
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if whole else None
-    except cv2.error:
+    except (cv2.error, OSError):
         image = None
     if image is None or image.dtype != np.uint8 or image.ndim not in (2, 3):
         raise InputError(f"{path} cannot be read as an image of 8 bits; is it complete?")

@@ -7,7 +7,10 @@ from hypothesis import settings
 from jaxtyping import install_import_hook
 
 # All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
-CHECKED = ["world", "render.eye", "render.renderer", "render.cubemap", "render.raster", "navigation"]
+CHECKED = [
+    "world", "render.eye", "render.renderer", "render.cubemap", "render.raster", "render.database", "render.database_files",
+    "render.database_writing", "render.database_check", "render.database_flow", "navigation",
+]  # fmt: skip
 install_import_hook(CHECKED, "typecheck.check")
 
 # No test asserts a time, those of hypothesis included.
