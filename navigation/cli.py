@@ -24,6 +24,7 @@ from .commands import (
     WorldCommand,
 )
 from .database_commands import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
+from .study_commands import StudyCommand, ThesisCommand
 from .terminal import say, show
 
 # A command by its name, or a sentence and the commands that go under one name.
@@ -37,6 +38,8 @@ COMMANDS: dict[str, Any] = {
     "models": ModelsCommand,
     "run": RunCommand,
     "play": PlayCommand,
+    "replicate": ("Re-run a published study and write a report to read beside it.", {"thesis": ThesisCommand}),
+    "study": StudyCommand,
     "database": (
         "Draw image databases in the BoB format, and look for what is wrong with them.",
         {"grid": DatabaseGridCommand, "route": DatabaseRouteCommand, "check": DatabaseCheckCommand},
@@ -90,12 +93,11 @@ def choice_of(commands: dict[str, Any]) -> Any:
         )
         return chosen
 
-    return Union[  # noqa: UP007 (made from a list)
-        tuple(
-            Annotated[Any, tyro.conf.subcommand(name, constructor=group(*each) if isinstance(each, tuple) else each)]
-            for name, each in commands.items()
-        )
+    kinds = [
+        Annotated[Any, tyro.conf.subcommand(name, constructor=group(*each) if isinstance(each, tuple) else each)]
+        for name, each in commands.items()
     ]
+    return Union[*kinds, Annotated[None, tyro.conf.Suppress]]  # the last so that one command is a choice, too
 
 
 @contextmanager

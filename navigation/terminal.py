@@ -12,8 +12,15 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def progress(what: str, unit: str) -> Iterator[Callable[[int, int], object]]:
-    """Show progress on standard error, where that is a terminal; gives a function report(done, total)."""
+def progress_of_parts() -> Iterator[Callable[[str, int, int], object]]:
+    """Show progress of work in parts; gives a function report(part, done, total)."""
+    with progress("", "") as report:
+        yield lambda part, done, total: report(done, total, description=part)
+
+
+@contextmanager
+def progress(what: str, unit: str) -> Iterator[Callable[..., object]]:
+    """Show progress on standard error, where that is a terminal; gives a function report(done, total, description=what)."""
     # Late: rich takes a tenth of a second that --help does not need.
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -24,7 +31,7 @@ def progress(what: str, unit: str) -> Iterator[Callable[[int, int], object]]:
         words, BarColumn(), *numbers, console=console, transient=True, disable=not console.is_terminal
     ) as bar:
         task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        yield lambda done, total, **changed: bar.update(task, completed=done, total=total, **changed)
 
 
 def show(result: dict[str, Any]) -> None:

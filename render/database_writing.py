@@ -15,6 +15,7 @@ from jaxtyping import Float, UInt8
 
 from world.errors import InputError
 from world.files import replacing
+from world.geometry import Bounds
 
 from .database import HEADING, Database, X, Y, Z, read_database
 from .database_files import (
@@ -45,6 +46,15 @@ class Grid:
     begin: tuple[float, float]
     spacing: float
     size: tuple[int, int]
+
+    @classmethod
+    def over(cls, field: Bounds, spacing: float) -> "Grid":
+        """The multiples of `spacing` from (0, 0) to (10, 10) m, as the published grid, that lie inside a field."""
+        low = np.ceil(np.maximum(0.0, [field.x_min, field.y_min]) / spacing - 1e-9).astype(int)
+        high = np.floor(np.minimum(10.0, [field.x_max, field.y_max]) / spacing + 1e-9).astype(int)
+        x, y = (low * spacing).tolist()
+        across, up = (high - low + 1).tolist()
+        return cls(begin=(x, y), spacing=spacing, size=(across, up))
 
     def poses(self) -> Float[np.ndarray, "n 3"]:
         """The poses, x running fastest."""

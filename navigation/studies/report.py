@@ -1,0 +1,240 @@
+"""The report of a replication: figures, results.json, and one HTML page that holds everything."""
+
+import base64
+import io
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import jinja2
+import matplotlib
+from PIL import Image
+
+from world.errors import InputError
+from world.files import replacing
+
+from . import published
+from .figures import PICTURES, Picture
+from .findings import Claim, Findings, plain
+from .material import Material
+from .settings import Settings
+from .tables import LISTINGS, Listing, cell
+from .thesis import STUDIES
+
+REPORT, RESULTS, FIGURES = "report.html", "results.json", "figures"
+DPI = 130
+Runs = dict[int, dict[str, Findings]]  # findings of each study, by seed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """A claim over all seeds. obtained: median, lowest and highest of each number. holds: for each seed."""
+
+    claim: Claim
+    obtained: dict[str, tuple[float, float, float]]
+    holds: list[bool]
+
+    @property
+    def words(self) -> str:
+        """Whether it holds, as people say it."""
+        held, of = sum(self.holds), len(self.holds)
+        if of == 1:
+            return "holds" if held else "does not hold"
+        return f"holds in {held} of {of}" if held else f"holds in none of {of}"
+
+    @property
+    def colour(self) -> str:
+        return "yes" if all(self.holds) else "partly" if any(self.holds) else "no"
+
+
+def verdicts(runs: Runs) -> list[Verdict]:
+    """The claims of all studies, over all seeds."""
+    first, *_ = runs.values()
+    found = []
+    for name, findings in first.items():
+        for k, claim in enumerate(findings.claims):
+            claims = [run[name].claims[k] for run in runs.values()]
+            obtained = {label: _spread([each.obtained.get(label) for each in claims]) for label in claim.obtained}
+            found.append(Verdict(claim=claim, obtained=obtained, holds=[each.holds for each in claims]))
+    return found
+
+
+def _spread(values: list[float | None]) -> tuple[float, float, float]:
+    """Median, lowest and highest of the numbers there are."""
+    numbers = [value for value in values if value is not None]
+    return (median(numbers), min(numbers), max(numbers)) if numbers else (float("nan"),) * 3
+
+
+def check_report_folder(out: Path, about: dict[str, Any], *, overwrite: bool = False) -> None:
+    """Refuse, before long work, a folder that holds a report of something else. Raises InputError."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; give a folder for the report")
+    results = out / RESULTS
+    if overwrite or not (results.exists() or (out / REPORT).exists()):
+        return
+    try:
+        before = json.loads(results.read_text(encoding="utf-8"))["about"]
+    except (OSError, ValueError, KeyError, TypeError):
+        before = {}
+    different = [key for key in {**before, **about} if before.get(key) != plain(about.get(key))]
+    if different:
+        raise InputError(
+            f"{out} holds a report of something else ({', '.join(different)}); give another --out, or --overwrite to replace it"
+        )
+
+
+def write_report(
+    out: Path, runs: Runs, material: Material, settings: Settings, *, about: dict[str, Any], command: str, title: str,
+    only: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Write figures (PNG and SVG), results.json and report.html; figures and tables are of the first seed.
+
+    material: of the first seed. about: what was studied, for the head of the report. command: how a study is done alone, with {study}
+    and {figure} in it. only: number of the one figure or table to make. Returns results.json's content.
+    """
+    first, *_ = runs.values()
+    exhibits = [each for each in (*PICTURES, *LISTINGS) if each.study in first and only in (None, *_numbers(each))]
+    if not exhibits:
+        known = ", ".join(each.number for each in (*PICTURES, *LISTINGS) if each.study in first)
+        raise InputError(f"there is no figure {only!r} in this study; it has {known}")
+    (out / FIGURES).mkdir(parents=True, exist_ok=True)
+    judged = verdicts(runs)
+    results = _results(runs, judged, about, settings)
+    parts = [
+        {"name": name, "title": STUDIES[name].title, "exhibits": [
+            _exhibit(each, first[name], material, settings, out / FIGURES, judged, command) for each in exhibits if each.study == name
+        ]} for name in first
+    ]  # fmt: skip
+    page = _page(parts, judged if only is None else [], runs, about, title)
+    with replacing(out / RESULTS) as partial:
+        partial.write_text(json.dumps(results, indent=1) + "\n")
+    with replacing(out / REPORT) as partial:  # last: a folder with a report holds everything
+        partial.write_text(page, encoding="utf-8")
+    return results
+
+
+def _numbers(exhibit: Picture | Listing) -> list[str]:
+    """The numbers that a person may call a figure by: 7, 8 or both."""
+    return [exhibit.number, *exhibit.number.split(", ")]
+
+
+def _name(exhibit: Picture | Listing) -> str:
+    """Stable, as files and anchors are called."""
+    kind = "figure" if isinstance(exhibit, Picture) else "table"
+    return f"{kind}-{exhibit.number.replace(', ', '-').replace('.', '-').replace(' ', '-')}"
+
+
+def _exhibit(
+    each: Picture | Listing, findings: Findings, material: Material, settings: Settings, folder: Path, judged: list[Verdict], command: str,
+) -> dict[str, Any]:  # fmt: skip
+    """What the page shows of a figure or table."""
+    thesis = each.number[0].isdigit()
+    shown = {
+        "name": _name(each), "title": each.title, "command": command.format(study=each.study, figure=f"'{each.number}'"),
+        "heading": ("Figure " if isinstance(each, Picture) else "Table ") + each.number if thesis else "Beyond the figures",
+        "claims": [_shown(verdict) for verdict in judged if verdict.claim.figure in _numbers(each) and _study_of(verdict) == each.study],
+    }  # fmt: skip
+    if isinstance(each, Picture):
+        return (
+            shown
+            | {"caption": each.caption.format(**findings.numbers)}
+            | _draw(each, findings, material, settings, folder)
+        )
+    rows = each.rows(findings)
+    columns = [column.rstrip() for column in rows.columns]
+    return shown | {
+        "caption": each.caption,
+        "columns": columns,
+        "rows": [[cell(plain(value)) for value in row] for row in rows.to_numpy(dtype=object)],
+    }
+
+
+def _study_of(verdict: Verdict) -> str:
+    return next(each.study for each in (*PICTURES, *LISTINGS) if verdict.claim.figure in _numbers(each))
+
+
+def _draw(each: Picture, findings: Findings, material: Material, settings: Settings, folder: Path) -> dict[str, Any]:
+    """Draw a figure into its files; give the PNG for the page."""
+    figure = each.draw(findings, material, settings)
+    data = io.BytesIO()
+    figure.savefig(data, dpi=DPI, format="png")
+    with replacing(folder / f"{_name(each)}.png") as partial:
+        partial.write_bytes(data.getvalue())
+    with matplotlib.rc_context({"svg.hashsalt": "tussock"}), replacing(folder / f"{_name(each)}.svg") as partial:
+        figure.savefig(partial, format="svg", metadata={"Date": None})
+    width, height = Image.open(data).size
+    return {
+        "image": base64.b64encode(data.getvalue()).decode("ascii"),
+        "width": round(width * 96 / DPI),
+        "height": round(height * 96 / DPI),
+    }
+
+
+def _shown(verdict: Verdict) -> dict[str, Any]:
+    """What the page shows of a claim."""
+    claim = verdict.claim
+    exhibit = next(each for each in (*PICTURES, *LISTINGS) if claim.figure in _numbers(each))
+    return {
+        "key": claim.key, "statement": claim.statement, "figure": claim.figure, "test": claim.test, "note": claim.note,
+        "published": claim.published, "obtained": verdict.obtained, "words": verdict.words, "verdict": verdict.colour, "link": _name(exhibit),
+    }  # fmt: skip
+
+
+def _results(runs: Runs, judged: list[Verdict], about: dict[str, Any], settings: Settings) -> dict[str, Any]:
+    """Everything in numbers; docs/report.md explains it."""
+    claims = {
+        verdict.claim.key: {
+            "statement": verdict.claim.statement, "figure": verdict.claim.figure, "test": verdict.claim.test, "note": verdict.claim.note,
+            "published": verdict.claim.published, "holds": verdict.holds,
+            "obtained": {label: dict(zip(("median", "lowest", "highest"), spread, strict=True)) for label, spread in verdict.obtained.items()},
+        } for verdict in judged
+    }  # fmt: skip
+    studies = {
+        str(seed): {
+            name: {
+                "published": {claim.key: claim.published for claim in findings.claims} | PUBLISHED.get(name, {}),
+                "obtained": {claim.key: claim.obtained for claim in findings.claims} | findings.numbers,
+                "holds": {claim.key: claim.holds for claim in findings.claims},
+                "tables": findings.to_json()["tables"],
+            } for name, findings in run.items()
+        } for seed, run in runs.items()
+    }  # fmt: skip
+    return plain({"version": 1, "about": about, "claims": claims, "seeds": studies})
+
+
+PUBLISHED: dict[str, dict[str, Any]] = {  # what the thesis gives beside its claims
+    "setting": {"grid_views": published.GRID_VIEWS},
+    "resolution": {"factors": published.FACTORS, "sampled": published.RESIZED, "sampled, smoothed": published.RESIZED_SMOOTHED},
+    "classifier": {
+        f"tuning_{part}": published.BEST_TUNINGS[part][2] for part in ("first_20", "whole_route")
+    } | {f"validation_score_{part}": published.BEST_TUNINGS[part][0] for part in ("first_20", "whole_route")},
+    "corners": {"tuning": published.BEST_TUNINGS["more_in_corners"][2]},
+}  # fmt: skip
+
+
+def _page(parts: list[dict], judged: list[Verdict], runs: Runs, about: dict[str, Any], title: str) -> str:
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters |= {"cell": cell, "spread": _spread_text}
+    template = environment.from_string(files(__package__).joinpath("report.html").read_text(encoding="utf-8"))
+    lead = (
+        "Every figure and table of the study, done again: the published number, the one found here, and what follows."
+    )
+    return template.render(
+        title=title,
+        lead=lead,
+        about=about,
+        claims=[_shown(verdict) for verdict in judged],
+        parts=parts,
+        seeds=list(runs),
+    )
+
+
+def _spread_text(spread: tuple[float, float, float]) -> str:
+    """A number, and its range where seeds differ."""
+    middle, low, high = spread
+    return cell(middle) if low == high or middle != middle else f"{cell(middle)} ({cell(low)} to {cell(high)})"
