@@ -12,17 +12,8 @@ import tyro
 
 from world.errors import InputError
 
-from .commands import (
-    CompareCommand,
-    EvaluateCommand,
-    ModelsCommand,
-    PlayCommand,
-    RouteCommand,
-    RunCommand,
-    TrainCommand,
-    ViewCommand,
-    WorldCommand,
-)
+from .learning_commands import CompareCommand, EvaluateCommand, ModelsCommand, PlayCommand, RunCommand, TrainCommand
+from .sight_commands import RouteCommand, ViewCommand, WorldCommand
 from .terminal import say, show
 
 # A command by its name, or a sentence and the commands that go under one name.
