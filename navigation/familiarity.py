@@ -1,5 +1,6 @@
 """What a familiarity model is, and what those here share."""
 
+import copy
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Collection
@@ -113,17 +114,15 @@ class Model(ABC):
         return torch.cat([self._scan(self._here(part)) for part in views.split(SCAN_AT_ONCE)])
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
-        """Take over what was learned, from training or from a file. Raises InputError for tensors that cannot be this model's."""
+        """Take over what was learned, from training or from a file; where that fails, it knows what it knew.
+
+        Raises InputError for tensors that cannot be this model's.
+        """
         self.check_learned(shape, learned)
-        before = self.learned, self.shape
-        self.learned, self.shape = {key: self._here(tensor) for key, tensor in learned.items()}, shape
-        try:
-            self._prepare()
-        except BaseException:
-            self.learned, self.shape = before
-            if self.shape is not None:
-                self._prepare()
-            raise
+        restored = copy.copy(self)
+        restored.learned, restored.shape = {key: self._here(tensor) for key, tensor in learned.items()}, shape
+        restored._prepare()
+        vars(self).update(vars(restored))
 
     def check_parameters(self) -> None:
         """Raise InputError for parameters that mean nothing, going by their defaults.
@@ -204,7 +203,7 @@ class Model(ABC):
 
     @abstractmethod
     def _prepare(self) -> None:
-        """Derive from `learned` what scanning needs."""
+        """Derive from `learned` what scanning needs; attributes are replaced, never changed in place (see `restore`)."""
 
 
 class IncrementalModel(Model):

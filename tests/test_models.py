@@ -220,6 +220,22 @@ def test_learning_on_that_runs_away_leaves_the_model_as_it_was(name, seed):
     pytest.fail("it never ran away")
 
 
+def test_learning_that_is_interrupted_at_the_end_leaves_the_model_as_it_was(name, monkeypatch):
+    model = cheap(name).fit(views(5))
+    before, prepare = copy.deepcopy(model), type(model)._prepare
+
+    def interrupted(model: Model) -> None:
+        prepare(model)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(model), "_prepare", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            model.fit(views(4, 1, w=20))
+    assert model.shape == before.shape
+    assert knows_what_it_knew(model, before)
+
+
 def test_memory_grows_with_the_views_only_where_they_are_kept(name):
     # From a dozen on: a mixture has no more networks than views.
     few, many = (cheap(name).fit(views(n)).memory_bytes for n in (16, 48))
