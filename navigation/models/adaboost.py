@@ -9,6 +9,8 @@ import numpy as np
 import torch
 from jaxtyping import Float32, Float64, UInt8
 
+from world.geometry import columns_of_turn
+
 from ..familiarity import Images, Learned, Model, Scans
 from ..rotation import FilterBank
 
@@ -45,7 +47,7 @@ class AdaBoost(Model):
     def _learn(self, views: Images) -> Learned:
         width = views.shape[2]
         pool = self._here(haar_filters(self.pool, views.shape[1], width, np.random.default_rng(self.seed)))
-        turns = [round(degrees / 360 * width) for degrees in self.negatives_deg]
+        turns = [round(columns_of_turn(degrees, width, full_turn=360)) for degrees in self.negatives_deg]
         negatives = torch.cat([torch.roll(views, turn, dims=-1) for turn in turns])
         learned = self._boost(pool, views, negatives)
         for _ in range(self.passes - 1):
