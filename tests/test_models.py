@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from jaxtyping import TypeCheckError
+from scenes import views
 
 from navigation.familiarity import FamiliarityModel, IncrementalModel, Model
 from navigation.model_files import load_model, save_model
@@ -34,16 +35,6 @@ CHEAPER = {
     "autoencoder": {"epochs": 10},
     "mushroom-body": {"cells": 500, "active": 0.02},
 }
-
-
-def views(n: int, seed: int = 0, h: int = 5, w: int = 24) -> torch.Tensor:
-    """White noise of mean 0 and variance 1, as encodings make views.
-
-    Drawn by numpy: torch's generator with the seed of a model would draw views that are the weights it begins with.
-    """
-    noise = np.random.default_rng(seed).normal(size=(n, h, w))
-    noise -= noise.mean(axis=(1, 2), keepdims=True)
-    return torch.tensor(noise / noise.std(axis=(1, 2), keepdims=True), dtype=torch.float32)
 
 
 def base(name: str) -> str:
