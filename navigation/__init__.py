@@ -61,33 +61,18 @@ __all__ = [
     "training_poses",
 ]
 
-_HOMES = {
+_HOMES = {  # of all but the models
     "agent": ("Agent", "Step"),
     "encoding": ("Encoding",),
     "evaluation": ("grid_positions", "heading_errors"),
     "familiarity": ("FamiliarityModel",),
-    "models": (
-        "MLP",
-        "RBM",
-        "AdaBoost",
-        "Autoencoder",
-        "Chain",
-        "Infomax",
-        "MLPMixture",
-        "MLPRotation",
-        "MushroomBody",
-        "PerfectMemory",
-        "VisualCompass",
-        "make_model",
-        "opponent",
-    ),
     "model_files": ("load_model", "save_model"),
     "recording": ("Recording",),
     "runs": ("record_walk",),
     "training": ("learn", "training_poses"),
     "trajectory": ("Trajectory",),
 }
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_HOME = dict.fromkeys(__all__, "models") | {name: home for home, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str):

@@ -9,7 +9,7 @@ from jaxtyping import Float, UInt8
 
 from render.renderer import Renderer
 from world.errors import InputError
-from world.geometry import Pose, Route, wrap_angle
+from world.geometry import Pose, Route, columns_of_turn, wrap_angle
 
 from .encoding import Encoding
 from .familiarity import FamiliarityModel, Following, SequenceModel, SnapshotModel
@@ -131,7 +131,7 @@ class Agent:
             recovering = self.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < self.step_limit
             yield Step(
                 index=index, pose=pose, view=view, familiarity=familiarity, turn=turn,
-                match=None if match is None else int(match[round(match_turn / (2 * np.pi) * len(match)) % len(match)]),
+                match=None if match is None else int(match[round(columns_of_turn(match_turn, len(match))) % len(match)]),
                 place=None if following is None else following.place,
                 deviation=float(deviation), along=float(along), reset=reset, reason=None if recovering else reason,
                 error=float(wrap_angle(pose.heading + turn - self.route.at(along)[0, 2])),

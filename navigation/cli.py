@@ -12,18 +12,16 @@ import tyro
 
 from world.errors import InputError
 
-from .commands import (
+from .database_commands import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
+from .learning_commands import (
     CompareCommand,
     EvaluateCommand,
     ModelsCommand,
     PlayCommand,
-    RouteCommand,
     RunCommand,
     TrainCommand,
-    ViewCommand,
-    WorldCommand,
 )
-from .database_commands import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
+from .sight_commands import RouteCommand, ViewCommand, WorldCommand
 from .study_commands import StudyCommand, ThesisCommand
 from .terminal import say, show
 

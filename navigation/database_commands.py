@@ -10,8 +10,8 @@ import tyro
 
 from world.errors import InputError
 
-from .commands import numbers
 from .options import PathOptions, SightOptions
+from .sight_commands import numbers
 from .terminal import progress, say
 
 if TYPE_CHECKING:

@@ -1,6 +1,8 @@
 """What a familiarity model is, and what those here share."""
 
+import copy
 import dataclasses
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -113,17 +115,15 @@ class Model(ABC):
         return torch.cat([self._scan(self._here(part)) for part in views.split(SCAN_AT_ONCE)])
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
-        """Take over what was learned, from training or from a file. Raises InputError for tensors that cannot be this model's."""
+        """Take over what was learned, from training or from a file; where that fails, it knows what it knew.
+
+        Raises InputError for tensors that cannot be this model's.
+        """
         self.check_learned(shape, learned)
-        before = self.learned, self.shape
-        self.learned, self.shape = {key: self._here(tensor) for key, tensor in learned.items()}, shape
-        try:
-            self._prepare()
-        except BaseException:
-            self.learned, self.shape = before
-            if self.shape is not None:
-                self._prepare()
-            raise
+        restored = copy.copy(self)
+        restored.learned, restored.shape = {key: self._here(tensor) for key, tensor in learned.items()}, shape
+        restored._prepare()
+        vars(self).update(vars(restored))
 
     def check_parameters(self) -> None:
         """Raise InputError for parameters that mean nothing, going by their defaults.
@@ -138,24 +138,28 @@ class Model(ABC):
 
     def _check_parameter(self, name: str, value: Any, default: Any) -> None:
         several = isinstance(default, tuple)
-        usual = default[0] if isinstance(default, tuple) else default
-        whole, choices = usual is None or isinstance(usual, int), self.CHOICES.get(name, ())
-        low, high = (1, 2**62) if whole else (-np.inf, np.inf) if several else (0, np.inf)
-        low, high = self.LIMITS.get(name, (0, high) if name == "seed" else (low, high))
-        numbers = not choices or name in self.LIMITS
-        hint = [f"one of {', '.join(choices)}"] * bool(choices)
-        hint += [f"{'a whole number' if whole else 'a number'} from {low:g} to {high:g}"] * numbers
-        values = list(value) if several and isinstance(value, (tuple, list)) else [value]
-        for each in values:
+        usual = default[0] if several else default
+        if usual is None or isinstance(usual, int):
+            kind, words, limits = Integral, "a whole number", (0 if name == "seed" else 1, 2**62)
+        else:
+            kind, words, limits = Real, "a number", (-np.inf if several else 0, np.inf)
+        low, high = self.LIMITS.get(name, limits)
+        choices = self.CHOICES.get(name, ())
+        numbers = name in self.LIMITS or not choices
+
+        def means_something(each: Any) -> bool:
             if isinstance(each, str):
-                right = each in choices
-            else:
-                number = isinstance(each, Integral if whole else Real) and not isinstance(each, bool)
-                right = numbers and number and np.isfinite(float(each)) and low <= float(each) <= high
-            if not right:
-                raise InputError(f"{self.name}: {name} {value!r}; give {' or '.join(hint)}")
-        if not values:
+                return each in choices
+            number = numbers and isinstance(each, kind) and not isinstance(each, bool)
+            return number and math.isfinite(each) and low <= float(each) <= high
+
+        values = value if several and isinstance(value, (tuple, list)) else [value]
+        if len(values) == 0:
             raise InputError(f"{self.name}: {name} is empty; give at least one")
+        if not all(map(means_something, values)):
+            hints = [f"one of {', '.join(choices)}"] if choices else []
+            hints += [f"{words} from {low:g} to {high:g}"] if numbers else []
+            raise InputError(f"{self.name}: {name} {value!r}; give {' or '.join(hints)}")
 
     @property
     def memory_bytes(self) -> int:
@@ -204,7 +208,7 @@ class Model(ABC):
 
     @abstractmethod
     def _prepare(self) -> None:
-        """Derive from `learned` what scanning needs."""
+        """Derive from `learned` what scanning needs; attributes are replaced, never changed in place (see `restore`)."""
 
 
 class IncrementalModel(Model):
@@ -235,7 +239,7 @@ def check_device(device: str) -> None:
     """Refuse a device that torch cannot use here. Raises InputError."""
     try:
         torch.zeros(1, device=device).item()
-    except (RuntimeError, AssertionError, NotImplementedError, TypeError) as error:
+    except (RuntimeError, AssertionError, TypeError) as error:
         raise InputError(f"device {device!r} cannot be used here ({str(error).splitlines()[0]})") from error
 
 

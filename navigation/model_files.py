@@ -105,6 +105,6 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
             poses.ndim == 2 and poses.shape[1] == 3 and poses.is_floating_point() and poses.isfinite().all()
         ):
             raise ValueError("its poses are not (n, 3) finite numbers")
-    except Exception as error:  # whatever a file may do to those who read it
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError) as error:
         raise InputError(f"{path} is damaged, or of another version ({first_line(error)}); train it anew") from error
     return SavedModel(model=model, encoding=encoding, eye=eye, poses=None if poses is None else poses.double().numpy())

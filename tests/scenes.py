@@ -1,6 +1,7 @@
-"""Tiny worlds for tests."""
+"""Tiny worlds and views for tests."""
 
 import numpy as np
+import torch
 
 from world.geometry import Bounds
 from world.scene import Ground, World
@@ -32,3 +33,8 @@ def random_poses(n: int, seed: int = 1) -> np.ndarray:
     """Poses (n, 3) inside FIELD."""
     rng = np.random.default_rng(seed)
     return np.column_stack([rng.uniform(-2, 2, (n, 2)), rng.uniform(-np.pi, np.pi, n)])
+
+
+def views(n: int, seed: int = 0, h: int = 5, w: int = 24) -> torch.Tensor:
+    """White noise. Drawn by numpy: torch's generator with the seed of a model would draw views that are the weights it begins with."""
+    return torch.tensor(np.random.default_rng(seed).normal(size=(n, h, w)), dtype=torch.float32)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from world.errors import InputError
-from world.geometry import Bounds, Pose, Route, column_azimuths, turn_of_columns, wrap_angle
+from world.geometry import Bounds, Pose, Route, column_azimuths, columns_of_turn, turn_of_columns, wrap_angle
 
 number = st.floats(-50, 50)
 angle = st.floats(-10, 10)
@@ -40,6 +40,20 @@ def test_columns_run_clockwise_from_behind_with_ahead_in_the_middle():
     assert np.isclose(azimuths[359], -azimuths[360])  # ahead lies between the two ..
     assert azimuths[359] > 0  # .. left first
     assert np.isclose(turn_of_columns(180, 720), np.pi / 2)
+
+
+@given(angle, st.floats(-1000, 1000), st.integers(4, 1000))
+def test_columns_and_turns_are_each_other_s_inverse(a, columns, width):
+    back = columns_of_turn(turn_of_columns(columns, width), width)
+    assert np.isclose(wrap_angle((back - columns) * 2 * np.pi / width), 0, atol=1e-9)
+    assert -width / 2 <= back <= width / 2
+    assert np.isclose(wrap_angle(turn_of_columns(columns_of_turn(a, width), width) - a), 0, atol=1e-9)
+    assert np.isclose(columns_of_turn(np.degrees(a), width, full_turn=360), columns_of_turn(a, width), atol=1e-9)
+
+
+def test_a_turn_to_the_left_is_columns_to_the_right():
+    assert columns_of_turn(np.pi / 2, 720) == 180
+    assert columns_of_turn(np.array([-90.0, 62.5]), 72, full_turn=360).tolist() == [-18, 12.5]
 
 
 millimetres = st.integers(

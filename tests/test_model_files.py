@@ -13,6 +13,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.torch import save_file
+from scenes import views
 
 from navigation.encoding import Encoding
 from navigation.familiarity import Model
@@ -31,10 +32,6 @@ CHEAPER = {
     "mushroom-body": {"cells": 100, "active": 0.05},
 }
 NAMES = [*MODELS, "opponent-perfect-memory", "opponent-autoencoder"]
-
-
-def views(n: int, seed: int = 0) -> torch.Tensor:
-    return torch.tensor(np.random.default_rng(seed).normal(size=(n, 5, 24)), dtype=torch.float32)
 
 
 @cache
@@ -257,11 +254,9 @@ def change(path: Path, key: str, into: Callable[[torch.Tensor], torch.Tensor]) -
     rewrite(path, lambda header, tensors: (tensors.update({key: into(tensors[key])}), header)[1])
 
 
-@pytest.mark.parametrize(("name", "key"), LEARNED)
+@pytest.mark.parametrize(("name", "key"), [(name, key) for name, key in LEARNED if trained(name).learned[key].ndim > 0])
 def test_a_tensor_of_another_shape_is_refused(name, key, tmp_path):
     path = tmp_path / "model"
-    if trained(name).learned[key].ndim == 0:
-        pytest.skip("a single number")
     for into in (lambda t: t[..., :-1].clone(), lambda t: torch.cat([t, t], dim=-1), lambda t: t[None].clone()):
         save_model(trained(name), path)
         change(path, f"learned.{key}", into)

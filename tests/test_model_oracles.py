@@ -8,6 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from jaxtyping import TypeCheckError
+from scenes import views
 from sklearn.base import clone
 from sklearn.metrics import classification_report
 from sklearn.model_selection import GridSearchCV
@@ -43,11 +44,6 @@ CHEAPER = {
     "mlp-mixture": {"steps": 20},
     "adaboost": {"pool": 100, "features": 10},
 }
-
-
-def views(n: int, seed: int = 0, h: int = 5, w: int = 24) -> torch.Tensor:
-    """White noise, drawn by numpy: torch's generator would draw what models begin with."""
-    return torch.tensor(np.random.default_rng(seed).normal(size=(n, h, w)), dtype=torch.float32)
 
 
 def turned(images: torch.Tensor) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from jaxtyping import TypeCheckError
+from scenes import views
 
 from navigation.familiarity import FamiliarityModel, IncrementalModel, Model
 from navigation.model_files import load_model, save_model
@@ -34,16 +35,6 @@ CHEAPER = {
     "autoencoder": {"epochs": 10},
     "mushroom-body": {"cells": 500, "active": 0.02},
 }
-
-
-def views(n: int, seed: int = 0, h: int = 5, w: int = 24) -> torch.Tensor:
-    """White noise of mean 0 and variance 1, as encodings make views.
-
-    Drawn by numpy: torch's generator with the seed of a model would draw views that are the weights it begins with.
-    """
-    noise = np.random.default_rng(seed).normal(size=(n, h, w))
-    noise -= noise.mean(axis=(1, 2), keepdims=True)
-    return torch.tensor(noise / noise.std(axis=(1, 2), keepdims=True), dtype=torch.float32)
 
 
 def base(name: str) -> str:
@@ -218,6 +209,22 @@ def test_learning_on_that_runs_away_leaves_the_model_as_it_was(name, seed):
             assert knows_what_it_knew(model, before)
             return
     pytest.fail("it never ran away")
+
+
+def test_learning_that_is_interrupted_at_the_end_leaves_the_model_as_it_was(name, monkeypatch):
+    model = cheap(name).fit(views(5))
+    before, prepare = copy.deepcopy(model), type(model)._prepare
+
+    def interrupted(model: Model) -> None:
+        prepare(model)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(model), "_prepare", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            model.fit(views(4, 1, w=20))
+    assert model.shape == before.shape
+    assert knows_what_it_knew(model, before)
 
 
 def test_memory_grows_with_the_views_only_where_they_are_kept(name):

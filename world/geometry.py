@@ -33,6 +33,15 @@ def turn_of_columns(columns, width: int):
     return wrap_angle(np.asarray(columns) * 2 * np.pi / width)
 
 
+def columns_of_turn(turn, width: int, full_turn: float = 2 * np.pi):
+    """Columns, of `width`, by which a turn (rad, left positive) rolls a panorama right; neither wrapped nor rounded.
+
+    full_turn: what a whole turn is where `turn` is not in radians. Degrees are given as they are, with 360: halfway between two
+    columns, a detour through radians would leave to chance which of them is the nearest.
+    """
+    return turn / full_turn * width
+
+
 class Pose(NamedTuple):
     """Where an eye stands and where it faces. `np.asarray([pose, ...])` is the (n, 3) array renderers take."""
 

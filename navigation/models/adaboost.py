@@ -9,7 +9,9 @@ import numpy as np
 import torch
 from jaxtyping import Float32, Float64, UInt8
 
-from ..familiarity import Images, Learned, Model, Scans
+from world.geometry import columns_of_turn
+
+from ..familiarity import SCAN_AT_ONCE, Images, Learned, Model, Scans
 from ..rotation import FilterBank
 
 NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a threshold unit is sought
@@ -45,7 +47,7 @@ class AdaBoost(Model):
     def _learn(self, views: Images) -> Learned:
         width = views.shape[2]
         pool = self._here(haar_filters(self.pool, views.shape[1], width, np.random.default_rng(self.seed)))
-        turns = [round(degrees / 360 * width) for degrees in self.negatives_deg]
+        turns = [round(columns_of_turn(degrees, width, full_turn=360)) for degrees in self.negatives_deg]
         negatives = torch.cat([torch.roll(views, turn, dims=-1) for turn in turns])
         learned = self._boost(pool, views, negatives)
         for _ in range(self.passes - 1):
@@ -88,7 +90,7 @@ class AdaBoost(Model):
         away = torch.arange(width, device=views.device)
         wrong = torch.minimum(away, width - away) * (360 / width) >= self.apart_deg
         bank = FilterBank(learned["filters"])
-        scan = torch.cat([votes(bank, learned, batch) for batch in views.split(64)]).where(wrong, -torch.inf)
+        scan = torch.cat([votes(bank, learned, batch) for batch in views.split(SCAN_AT_ONCE)]).where(wrong, -torch.inf)
         turns = scan.topk(min(self.mined, int(wrong.sum())), dim=1).indices.tolist()
         return torch.stack([view.roll(k, dims=-1) for view, ks in zip(views, turns, strict=True) for k in ks])
 

@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from torch.nn.functional import binary_cross_entropy_with_logits, linear
 
 from world.errors import InputError
+from world.geometry import columns_of_turn
 
 from ..familiarity import Images, Learned, Model, Scans, check_scan, check_training
 from ..rotation import FilterBank
@@ -80,7 +81,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
     def training_data(self, views: Images) -> tuple[Float32[torch.Tensor, "m h w"], Float32[torch.Tensor, " m"]]:
         """The views labelled 1, followed by turned copies of them labelled 0."""
-        turns = [round(degrees / 360 * views.shape[-1]) for degrees in self.negatives_deg]
+        turns = [round(columns_of_turn(degrees, views.shape[-1], full_turn=360)) for degrees in self.negatives_deg]
         turned = [
             torch.roll(view, turns[(i + k) % len(turns)], dims=-1)
             for k in range(self.negatives_each)

@@ -45,8 +45,10 @@ class Opponent(Model):
 
     def _prepare(self) -> None:
         assert self.shape is not None
-        for side, model in (("attractive", self.attractive), ("repulsive", self.repulsive)):
+        for side in ("attractive", "repulsive"):
+            model = copy.copy(getattr(self, side))
             model.restore(self.shape, one(side, self.learned))
+            setattr(self, side, model)
 
     def _scan(self, views: Images) -> Scans:
         return self.attractive.scan(views) - self.repulsive.scan(views)
