@@ -83,15 +83,17 @@ def _claims(by_model: pd.DataFrame) -> list[Claim]:
     first, last = by_model.iloc[0], by_model[by_model["model"] == "mlp-rotation"].iloc[-1]
     return [
         Claim(
-            key="full-scan-solved", figure="beyond",
-            statement="Beyond the thesis: a network of the same size, taught all rotations of edges, recovers headings over the full circle.",
+            key="full-scan-solved",
+            figure="beyond",
+            statement="Beyond the thesis: a network as large, taught all rotations of edges, recovers headings over the full circle.",
             published={"median error of its classifier (deg)": published.SCAN_MEDIAN_DEG[360]},
             obtained={
-                "median error of its classifier (deg)": float(first["median_error_deg"]), "of mlp-rotation (deg)": float(last["median_error_deg"]),
+                "median error of its classifier (deg)": float(first["median_error_deg"]),
+                "of mlp-rotation (deg)": float(last["median_error_deg"]),
                 "in corners, classifier (deg)": float(first["median_error_deg_corners"]),
                 "in corners, mlp-rotation (deg)": float(last["median_error_deg_corners"]),
             },
             test="its median error over 360 degrees is under 10, and lower than the classifier's",
             holds=bool(last["median_error_deg"] < 10 and last["median_error_deg"] < first["median_error_deg"]),
         ),
-    ]  # fmt: skip
+    ]

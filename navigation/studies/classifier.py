@@ -142,46 +142,72 @@ def _claims(tables: dict[str, pd.DataFrame], numbers: dict[str, Any]) -> list[Cl
     solver = numbers["tuning_whole_route"]["solver"]
     return [
         Claim(
-            key="classifier-accurate", figure="24",
+            key="classifier-accurate",
+            figure="24",
             statement="The classifier is nearly perfect on held-out views, of a small part and of the whole route.",
             published={f"accuracy, {labels[part]}": published.HELD_OUT_ACCURACY[part] for part in PARTS},
             obtained={f"accuracy, {labels[part]}": accuracies[part] for part in PARTS},
-            test="both accuracies are 0.9 or more", holds=min(accuracies.values()) >= 0.9,
+            test="both accuracies are 0.9 or more",
+            holds=min(accuracies.values()) >= 0.9,
         ),
         Claim(
-            key="few-views-work", figure="25", statement="Having learned 20 views, the classifier recovers headings.",
-            published={"median error (deg)": published.CLASSIFIER_MEDIAN_DEG["first_20"]}, obtained={"median error (deg)": few},
-            test="the median error is under 10 degrees", holds=few < 10,
+            key="few-views-work",
+            figure="25",
+            statement="Having learned 20 views, the classifier recovers headings.",
+            published={"median error (deg)": published.CLASSIFIER_MEDIAN_DEG["first_20"]},
+            obtained={"median error (deg)": few},
+            test="the median error is under 10 degrees",
+            holds=few < 10,
         ),
         Claim(
-            key="whole-route-fails", figure="27",
+            key="whole-route-fails",
+            figure="27",
             statement="Having learned the whole route, it does not, for all its accuracy on held-out views.",
-            published={"median error, whole route (deg)": published.CLASSIFIER_MEDIAN_DEG["whole_route"],
-                       "by the first 20 views'": published.CLASSIFIER_MEDIAN_DEG["whole_route"] / published.CLASSIFIER_MEDIAN_DEG["first_20"]},
+            published={
+                "median error, whole route (deg)": published.CLASSIFIER_MEDIAN_DEG["whole_route"],
+                "by the first 20 views'": published.CLASSIFIER_MEDIAN_DEG["whole_route"]
+                / published.CLASSIFIER_MEDIAN_DEG["first_20"],
+            },
             obtained={"median error, whole route (deg)": whole, "by the first 20 views'": whole / few},
-            test="the median error is over 20 degrees, and twice that of the first 20 views or more", holds=whole > 20 and whole >= 2 * few,
+            test="the median error is over 20 degrees, and twice that of the first 20 views or more",
+            holds=whole > 20 and whole >= 2 * few,
         ),
         Claim(
-            key="perfect-memory-beside", figure="28", statement="Perfect memory of the same views recovers the headings that the classifier misses.",
+            key="perfect-memory-beside",
+            figure="28",
+            statement="Perfect memory of the same views recovers the headings that the classifier misses.",
             published={},
-            obtained={"median error, perfect memory (deg)": memory["median_error_deg"], "classifier (deg)": network["median_error_deg"],
-                      "share over 45 degrees, perfect memory": memory["share_over_45"], "classifier": network["share_over_45"]},
+            obtained={
+                "median error, perfect memory (deg)": memory["median_error_deg"],
+                "classifier (deg)": network["median_error_deg"],
+                "share over 45 degrees, perfect memory": memory["share_over_45"],
+                "classifier": network["share_over_45"],
+            },
             test="its median error is under half of the classifier's, and it fails less often",
-            holds=memory["median_error_deg"] < network["median_error_deg"] / 2 and memory["share_over_45"] < network["share_over_45"],
+            holds=memory["median_error_deg"] < network["median_error_deg"] / 2
+            and memory["share_over_45"] < network["share_over_45"],
         ),
         Claim(
-            key="lbfgs-for-few", figure="7.4", statement="With few views, lbfgs is the best solver.",
-            published={"lbfgs among the best five": 5.0}, obtained={"lbfgs among the best five": float((top["param_solver"] == "lbfgs").sum())},
-            test="at least four of the best five tunings use it", holds=int((top["param_solver"] == "lbfgs").sum()) >= 4,
+            key="lbfgs-for-few",
+            figure="7.4",
+            statement="With few views, lbfgs is the best solver.",
+            published={"lbfgs among the best five": 5.0},
+            obtained={"lbfgs among the best five": float((top["param_solver"] == "lbfgs").sum())},
+            test="at least four of the best five tunings use it",
+            holds=int((top["param_solver"] == "lbfgs").sum()) >= 4,
             note=f"{numbers['tunings_with_the_best_score_first_20']} tunings share the best score.",
         ),
         Claim(
-            key="adam-for-the-route", figure="7.5", statement="With the whole route, the best tuning uses adam.",
+            key="adam-for-the-route",
+            figure="7.5",
+            statement="With the whole route, the best tuning uses adam.",
             published={"best validation score": published.BEST_TUNINGS["whole_route"][0]},
             obtained={"best validation score": numbers["validation_score_whole_route"]},
-            test="the first tuning of the search uses it", holds=solver == "adam", note=f"Here it is {solver}.",
+            test="the first tuning of the search uses it",
+            holds=solver == "adam",
+            note=f"Here it is {solver}.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def tuning_of(findings: Findings) -> dict[str, Any]:

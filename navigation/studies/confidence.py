@@ -32,8 +32,8 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
         network = MLP(**tuning, max_iter=iterations, seed=seed).fit(views[learned])
         for scan in SCANS_DEG:
             table = headings(material, network, places, scan_deg=scan)
-            rows.append({"iterations": iterations, "seed": seed, "scan_deg": scan} | errors_of(table)
-                        | {"high_share": _high_share(network, places, material.near), "reversed_share": _reversed_share(table)})  # fmt: skip
+            more = {"high_share": _high_share(network, places, material.near), "reversed_share": _reversed_share(table)}
+            rows.append({"iterations": iterations, "seed": seed, "scan_deg": scan} | errors_of(table) | more)
             tables[iterations, seed, scan] = table
         trained[iterations, seed] = network
         progress(done + 1, len(runs))
@@ -43,8 +43,9 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
     recovered, reversed_ = _examples(material, tables[long, seed, 360])
     curves = [
         confidence_curve(trained[iterations, seed], places, material, place).assign(iterations=iterations, place=name)
-        for iterations in settings.iterations for name, place in (("recovered", recovered), ("reversed", reversed_))
-    ]  # fmt: skip
+        for iterations in settings.iterations
+        for name, place in (("recovered", recovered), ("reversed", reversed_))
+    ]
     names = {"short": (short, 360), "long": (long, 360), "scan_180": (long, 180), "scan_90": (long, 90)}
     return Findings(
         tables={"networks": results, "curves": pd.concat(curves, ignore_index=True), "chance": _chance(material)}
@@ -104,31 +105,51 @@ def _claims(results: pd.DataFrame, chance: pd.DataFrame, settings: Settings) -> 
     wide, half, quarter = (float(median[long, scan]) for scan in SCANS_DEG)
     return [
         Claim(
-            key="longer-training-helps", figure="34", statement="3,000 iterations recover more headings than 600.",
-            published={f"median error, {n:,} iterations (deg)": published.ITERATIONS_MEDIAN_DEG[n] for n in (600, 3000)},
+            key="longer-training-helps",
+            figure="34",
+            statement="3,000 iterations recover more headings than 600.",
+            published={
+                f"median error, {n:,} iterations (deg)": published.ITERATIONS_MEDIAN_DEG[n] for n in (600, 3000)
+            },
             obtained={f"median error, {n:,} iterations (deg)": float(median[n, 360]) for n in (short, long)},
-            test="the median error is lower after the longer training", holds=bool(median[long, 360] < median[short, 360]),
+            test="the median error is lower after the longer training",
+            holds=bool(median[long, 360] < median[short, 360]),
         ),
         Claim(
-            key="longer-training-broadens", figure="33", statement="Longer training spreads high confidence over more rotations.",
-            published={}, obtained={f"share of rotations near the top, {n:,} iterations": float(broad[n, 360]) for n in (short, long)},
+            key="longer-training-broadens",
+            figure="33",
+            statement="Longer training spreads high confidence over more rotations.",
+            published={},
+            obtained={
+                f"share of rotations near the top, {n:,} iterations": float(broad[n, 360]) for n in (short, long)
+            },
             test="the share of rotations in the upper tenth of a scan's range is larger after the longer training",
             holds=bool(broad[long, 360] > broad[short, 360]),
         ),
         Claim(
-            key="failures-point-backwards", figure="36", statement="Headings that fail point backwards, where the network was never taught.",
-            published={}, obtained={"share of failures over 135 degrees off": backward},
-            test="of the headings over 45 degrees off, more than a third are over 135 degrees off", holds=backward > 1 / 3,
+            key="failures-point-backwards",
+            figure="36",
+            statement="Headings that fail point backwards, where the network was never taught.",
+            published={},
+            obtained={"share of failures over 135 degrees off": backward},
+            test="of the headings over 45 degrees off, more than a third are over 135 degrees off",
+            holds=backward > 1 / 3,
             note="Evenly spread failures would give a third.",
         ),
         Claim(
-            key="narrower-scans-help", figure="38", statement="Scanning 180, then 90 degrees about the general direction lowers the error.",
+            key="narrower-scans-help",
+            figure="38",
+            statement="Scanning 180, then 90 degrees about the general direction lowers the error.",
             published={f"median error, {scan} degrees (deg)": published.SCAN_MEDIAN_DEG[scan] for scan in SCANS_DEG}
             | {"180 degrees, in the conclusion (deg)": published.SCAN_180_IN_CONCLUSION_DEG},
-            obtained={f"median error, {scan} degrees (deg)": value for scan, value in zip(SCANS_DEG, (wide, half, quarter), strict=True)}
+            obtained={
+                f"median error, {scan} degrees (deg)": value
+                for scan, value in zip(SCANS_DEG, (wide, half, quarter), strict=True)
+            }
             | {f"a random heading in {scan} degrees (deg)": float(by_chance[scan]) for scan in SCANS_DEG},
-            test="the median error falls from 360 to 180 to 90 degrees", holds=wide > half > quarter,
+            test="the median error falls from 360 to 180 to 90 degrees",
+            holds=wide > half > quarter,
             note="The thesis gives 15 degrees for the 180 degree scan in section 4.4.7.2 and 17 in its conclusion. A narrow scan about the "
             "right direction lowers the error of a random heading as well.",
         ),
-    ]  # fmt: skip
+    ]

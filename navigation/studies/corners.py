@@ -69,13 +69,15 @@ def study(
         networks, shown = train_and_test(material, views, places, learned, material.near, parameters, settings)
         table = shown["headings"].assign(in_corner=in_corner, in_section=in_section)
         tables[f"headings, {name}"] = table
-        parts = {"corners": table[in_corner], "straights": table[~in_corner], "section": table[in_section]}
-        rows.append(
-            {"selection": name, "views": len(learned), "accuracy": networks["accuracy"].median(),
-             "median_error_deg": networks["median_error_deg"].median()}
-            | {f"median_error_deg_{part}": errors_of(rows_)["median_error_deg"] for part, rows_ in parts.items()}
-            | {"recovered_in_section": int((parts["section"]["error_deg"] < RECOVERED_DEG).sum()), "places_in_section": int(in_section.sum())}
-        )  # fmt: skip
+        parts = {"corners": in_corner, "straights": ~in_corner, "section": in_section}
+        medians = {
+            f"median_error_deg_{part}": errors_of(table[where])["median_error_deg"] for part, where in parts.items()
+        }
+        rows.append({
+            "selection": name, "views": len(learned), "accuracy": networks["accuracy"].median(),
+            "median_error_deg": networks["median_error_deg"].median(), **medians, "places_in_section": int(in_section.sum()),
+            "recovered_in_section": int((table.loc[in_section, "error_deg"] < RECOVERED_DEG).sum()),
+        })  # fmt: skip
     tables |= {"by_selection": pd.DataFrame(rows), "selections": _table_of(material, selections)}
     numbers = {"section_first_view": section[0], "section_last_view": section[1], "corner_share": SHARE}
     return Findings(tables=tables, numbers=numbers, claims=_claims(tables))
@@ -146,27 +148,41 @@ def _claims(tables: dict[str, pd.DataFrame]) -> list[Claim]:
     share = [float(row["recovered_in_section"] / max(1, row["places_in_section"])) for row in (plain, doubled)]
     return [
         Claim(
-            key="corners-change-faster", figure="30", statement="Successive views differ more in corners than on straights.",
+            key="corners-change-faster",
+            figure="30",
+            statement="Successive views differ more in corners than on straights.",
             published={},
-            obtained={"RMS in corners (grey levels)": corner, "on straights": straight, "rank correlation with turning": float(rank.statistic)},
+            obtained={
+                "RMS in corners (grey levels)": corner,
+                "on straights": straight,
+                "rank correlation with turning": float(rank.statistic),
+            },
             test="the median difference is larger in corners, and its rank correlation with turning is positive (p < 0.05)",
             holds=bool(corner > straight and rank.statistic > 0 and rank.pvalue < 0.05),
         ),
         Claim(
-            key="worse-in-corners", figure="27", statement="The classifier of the whole route fails in corners more than on straights.",
+            key="worse-in-corners",
+            figure="27",
+            statement="The classifier of the whole route fails in corners more than on straights.",
             published={},
-            obtained={"median error in corners (deg)": float(plain["median_error_deg_corners"]),
-                      "on straights": float(plain["median_error_deg_straights"])},
+            obtained={
+                "median error in corners (deg)": float(plain["median_error_deg_corners"]),
+                "on straights": float(plain["median_error_deg_straights"]),
+            },
             test="the median error is larger at places beside corners",
             holds=bool(plain["median_error_deg_corners"] > plain["median_error_deg_straights"]),
         ),
         Claim(
-            key="more-corner-views-help", figure="32", statement="Twice as many views in the corners recover more headings there.",
-            published={"share recovered, every 6th view": published.RECOVERED_IN_CORNERS["every 6th view"],
-                       "twice as many in corners": published.RECOVERED_IN_CORNERS["twice as many in corners"]},
+            key="more-corner-views-help",
+            figure="32",
+            statement="Twice as many views in the corners recover more headings there.",
+            published={
+                "share recovered, every 6th view": published.RECOVERED_IN_CORNERS["every 6th view"],
+                "twice as many in corners": published.RECOVERED_IN_CORNERS["twice as many in corners"],
+            },
             obtained={"share recovered, every 6th view": share[0], "twice as many in corners": share[1]},
             test="more of the headings in the part looked at are less than 45 degrees off",
             holds=share[1] > share[0],
             note=f"On {int(plain['places_in_section'])} places; the thesis had 9.",
         ),
-    ]  # fmt: skip
+    ]

@@ -136,3 +136,22 @@ def panorama(axes: Axes, view: np.ndarray, title: str = "") -> None:
     axes.imshow(image, extent=(180, -180, 0, 75), cmap="gray", aspect="auto", interpolation="nearest")
     axes.set(xticks=range(-180, 181, 90), xlim=(180, -180), yticks=[], xlabel="degrees left of straight ahead")
     axes.set_title(title, fontsize=9)
+
+
+def diagrams(tables: Mapping[str, pd.DataFrame], route: Route, world: World | None, names: Mapping[str, str]) -> Figure:
+    """Heading diagrams of tables side by side; names: their titles."""
+    shown = [tables[name][["x_m", "y_m"]].to_numpy() for name in names]
+    figure, axes = plans(np.vstack([route.xy, *shown]), len(names))
+    for axis, (name, title) in zip(axes[0], names.items(), strict=True):
+        heading_diagram(axis, tables[name], route, world, title)
+    for axis in axes[0, 1:]:
+        axis.set_ylabel("")
+    return figure
+
+
+def nothing(why: str) -> Figure:
+    """A figure that says why there is none."""
+    figure, axes = canvas((7.2, 1.2))
+    axes[0, 0].axis("off")
+    axes[0, 0].text(0.5, 0.5, why, ha="center", va="center")
+    return figure

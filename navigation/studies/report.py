@@ -102,7 +102,7 @@ def write_report(
         raise InputError(f"there is no figure {only!r} in this study; it has {known}")
     (out / FIGURES).mkdir(parents=True, exist_ok=True)
     judged = verdicts(runs)
-    results = _results(runs, judged, about, settings)
+    results = _results(runs, judged, about)
     parts = [
         {"name": name, "title": STUDIES[name].title, "exhibits": [
             _exhibit(each, first[name], material, settings, out / FIGURES, judged, command) for each in exhibits if each.study == name
@@ -174,35 +174,43 @@ def _draw(each: Picture, findings: Findings, material: Material, settings: Setti
 
 
 def _shown(verdict: Verdict) -> dict[str, Any]:
-    """What the page shows of a claim."""
+    """What the page shows of a claim: a row of numbers for each label, published and obtained."""
     claim = verdict.claim
     exhibit = next(each for each in (*PICTURES, *LISTINGS) if claim.figure in _numbers(each))
+    labels = list(dict.fromkeys([*claim.obtained, *claim.published]))
+    numbers = [(label, claim.published.get(label), verdict.obtained.get(label)) for label in labels]
     return {
-        "key": claim.key, "statement": claim.statement, "figure": claim.figure, "test": claim.test, "note": claim.note,
-        "published": claim.published, "obtained": verdict.obtained, "words": verdict.words, "verdict": verdict.colour, "link": _name(exhibit),
-    }  # fmt: skip
+        "claim": claim,
+        "numbers": numbers,
+        "words": verdict.words,
+        "colour": verdict.colour,
+        "link": _name(exhibit),
+    }
 
 
-def _results(runs: Runs, judged: list[Verdict], about: dict[str, Any], settings: Settings) -> dict[str, Any]:
+def _results(runs: Runs, judged: list[Verdict], about: dict[str, Any]) -> dict[str, Any]:
     """Everything in numbers; docs/report.md explains it."""
-    claims = {
-        verdict.claim.key: {
-            "statement": verdict.claim.statement, "figure": verdict.claim.figure, "test": verdict.claim.test, "note": verdict.claim.note,
-            "published": verdict.claim.published, "holds": verdict.holds,
-            "obtained": {label: dict(zip(("median", "lowest", "highest"), spread, strict=True)) for label, spread in verdict.obtained.items()},
-        } for verdict in judged
-    }  # fmt: skip
-    studies = {
-        str(seed): {
-            name: {
-                "published": {claim.key: claim.published for claim in findings.claims} | PUBLISHED.get(name, {}),
-                "obtained": {claim.key: claim.obtained for claim in findings.claims} | findings.numbers,
-                "holds": {claim.key: claim.holds for claim in findings.claims},
-                "tables": findings.to_json()["tables"],
-            } for name, findings in run.items()
-        } for seed, run in runs.items()
-    }  # fmt: skip
-    return plain({"version": 1, "about": about, "claims": claims, "seeds": studies})
+    claims = {}
+    for verdict in judged:
+        kept = {key: getattr(verdict.claim, key) for key in ("statement", "figure", "test", "note", "published")}
+        spreads = {
+            label: {"median": middle, "lowest": low, "highest": high}
+            for label, (middle, low, high) in verdict.obtained.items()
+        }
+        claims[verdict.claim.key] = kept | {"obtained": spreads, "holds": verdict.holds}
+    seeds = {
+        str(seed): {name: _results_of(name, findings) for name, findings in run.items()} for seed, run in runs.items()
+    }
+    return plain({"version": 1, "about": about, "claims": claims, "seeds": seeds})
+
+
+def _results_of(name: str, findings: Findings) -> dict[str, Any]:
+    return {
+        "published": {claim.key: claim.published for claim in findings.claims} | PUBLISHED.get(name, {}),
+        "obtained": {claim.key: claim.obtained for claim in findings.claims} | findings.numbers,
+        "holds": {claim.key: claim.holds for claim in findings.claims},
+        "tables": findings.to_json()["tables"],
+    }
 
 
 PUBLISHED: dict[str, dict[str, Any]] = {  # what the thesis gives beside its claims
@@ -219,7 +227,7 @@ def _page(parts: list[dict], judged: list[Verdict], runs: Runs, about: dict[str,
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"cell": cell, "spread": _spread_text}
+    environment.filters |= {"cell": cell, "spread": _spread_text, "label": lambda label: label.replace("(deg)", "(°)")}
     template = environment.from_string(files(__package__).joinpath("report.html").read_text(encoding="utf-8"))
     lead = (
         "Every figure and table of the study, done again: the published number, the one found here, and what follows."

@@ -75,48 +75,78 @@ def _note(part: str) -> str:
 
 LISTINGS = [
     Listing(
-        number="7.3 numbers", study="resolution", title="The twenty numbers of appendix 7.3, twice",
-        caption="Errors (degrees) at each resize factor: the thesis's, and views sampled as its were.", rows=_resizing,
+        number="7.3 numbers",
+        study="resolution",
+        title="The twenty numbers of appendix 7.3, twice",
+        caption="Errors (degrees) at each resize factor: the thesis's, and views sampled as its were.",
+        rows=_resizing,
     ),
     Listing(
-        number="24", study="classifier", title="Classification report, first 20 views",
-        caption="On held-out views. The thesis: precision, recall and f1 of 1.00 for both classes, 10 views each.", rows=_whole("report_first_20"),
+        number="24",
+        study="classifier",
+        title="Classification report, first 20 views",
+        caption="On held-out views. The thesis: precision, recall and f1 of 1.00 for both classes, 10 views each.",
+        rows=_whole("report_first_20"),
     ),
     Listing(
-        number="7.4", study="classifier", title="Grid search, first 20 views",
-        caption=f"The best tunings of the thesis's grid by scikit-learn's GridSearchCV, three folds. {_note('first_20')}", rows=_search("search_first_20"),
+        number="7.4",
+        study="classifier",
+        title="Grid search, first 20 views",
+        caption=f"The best tunings of the thesis's grid by scikit-learn's GridSearchCV, three folds. {_note('first_20')}",
+        rows=_search("search_first_20"),
     ),
     Listing(
-        number="26", study="classifier", title="Classification report, whole route",
-        caption="On held-out views. The thesis: precision 0.96 and 0.94, recall 0.93 and 0.96, 46 views each.", rows=_whole("report_whole_route"),
+        number="26",
+        study="classifier",
+        title="Classification report, whole route",
+        caption="On held-out views. The thesis: precision 0.96 and 0.94, recall 0.93 and 0.96, 46 views each.",
+        rows=_whole("report_whole_route"),
     ),
     Listing(
-        number="7.5", study="classifier", title="Grid search, whole route",
-        caption=f"As above. {_note('whole_route')}", rows=_search("search_whole_route"),
+        number="7.5",
+        study="classifier",
+        title="Grid search, whole route",
+        caption=f"As above. {_note('whole_route')}",
+        rows=_search("search_whole_route"),
     ),
     Listing(
-        number="starts", study="classifier", title="Networks from different random starts",
-        caption="Each with the best tuning of its search; the medians of these rows are the numbers above.", rows=_networks,
+        number="starts",
+        study="classifier",
+        title="Networks from different random starts",
+        caption="Each with the best tuning of its search; the medians of these rows are the numbers above.",
+        rows=_networks,
     ),
     Listing(
-        number="selections", study="corners", title="Which views are learned, and what it does",
-        caption="The thesis's two choices; as many views as its second, spread evenly; as many as its first, chosen so that successive ones "
-        "differ equally. All with the best tuning for the whole route but for the last row.", rows=_whole("by_selection"),
+        number="selections",
+        study="corners",
+        title="Which views are learned, and what it does",
+        caption="The thesis's two choices; as many views as its second, spread evenly; as many as its first, chosen so that "
+        "successive ones differ equally. All with the best tuning for the whole route but for the last row.",
+        rows=_whole("by_selection"),
     ),
     Listing(
-        number="7.6", study="corners", title="Grid search, more views in the corners",
-        caption=f"As above. {_note('more_in_corners')}", rows=_search("search"),
+        number="7.6",
+        study="corners",
+        title="Grid search, more views in the corners",
+        caption=f"As above. {_note('more_in_corners')}",
+        rows=_search("search"),
     ),
     Listing(
-        number="scans", study="confidence", title="Training time and the width of the scan",
-        caption="Medians over random starts. A random heading in the same scan has the error in the last column: part of what a narrow scan gains.",
+        number="scans",
+        study="confidence",
+        title="Training time and the width of the scan",
+        caption="Medians over random starts. A random heading in the same scan has the error in the last column: part of what a "
+        "narrow scan gains.",
         rows=_scans,
     ),
     Listing(
-        number="beyond numbers", study="beyond", title="Models, features and choices of views",
-        caption="Errors over the full circle; medians over random starts.", rows=_whole("by_model"),
+        number="beyond numbers",
+        study="beyond",
+        title="Models, features and choices of views",
+        caption="Errors over the full circle; medians over random starts.",
+        rows=_whole("by_model"),
     ),
-]  # fmt: skip
+]
 
 
 def cell(value: object) -> str:

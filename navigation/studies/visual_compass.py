@@ -170,17 +170,22 @@ def _claims(around: pd.DataFrame, curves: pd.DataFrame) -> list[Claim]:
     lowest = curves.groupby("view")["rms"].min()
     return [
         Claim(
-            key="idf-minimum", figure="6",
-            statement="The image difference has one minimum, of zero, at the same place, a higher one nearby, and none to rely on far away.",
+            key="idf-minimum",
+            figure="6",
+            statement="The image difference has a minimum of zero at the same place, a higher one nearby, and none to rely on far away.",
             published={"lowest RMS at the same place": 0.0},
             obtained={
-                "lowest RMS at the same place": float(lowest["same"]), "nearby": float(lowest["near"]), "far away": float(lowest["far"]),
+                "lowest RMS at the same place": float(lowest["same"]),
+                "nearby": float(lowest["near"]),
+                "far away": float(lowest["far"]),
             },
             test="the lowest RMS difference (grey levels) is 0 at the same place, and lower nearby than far away",
             holds=bool(lowest["same"] < 1e-3 and lowest["same"] < lowest["near"] < lowest["far"]),
         ),
         Claim(
-            key="visual-compass-near", figure="8", statement="One snapshot recovers the heading at most places close to it.",
+            key="visual-compass-near",
+            figure="8",
+            statement="One snapshot recovers the heading at most places close to it.",
             published={},
             obtained={
                 "share recovered within 0.25 m": shares["share_recovered_within_0.25_m"],
@@ -190,13 +195,18 @@ def _claims(around: pd.DataFrame, curves: pd.DataFrame) -> list[Claim]:
             holds=shares["share_recovered_within_0.25_m"] > 0.5,
         ),
         Claim(
-            key="error-grows-with-distance", figure="11", statement="The heading error grows with the distance from the snapshot.",
+            key="error-grows-with-distance",
+            figure="11",
+            statement="The heading error grows with the distance from the snapshot.",
             published={},
             obtained={
-                f"median error at {rings['from_m'].iloc[k]:.1f} to {rings['from_m'].iloc[k] + RING:.1f} m (deg)":
-                    float(rings["median_error_deg"].iloc[k]) for k in (0, -1)
-            } | {"rank correlation": float(rank.statistic)},
+                f"median error at {rings['from_m'].iloc[k]:.1f} to {rings['from_m'].iloc[k] + RING:.1f} m (deg)": float(
+                    rings["median_error_deg"].iloc[k]
+                )
+                for k in (0, -1)
+            }
+            | {"rank correlation": float(rank.statistic)},
             test="the rank correlation of error and distance is positive (p < 0.01)",
             holds=bool(rank.statistic > 0 and rank.pvalue < 0.01),
         ),
-    ]  # fmt: skip
+    ]
