@@ -41,7 +41,7 @@ def plans(xy: np.ndarray, columns: int = 1) -> tuple[Figure, np.ndarray]:
 @lru_cache(maxsize=1)
 def from_above(world: World) -> tuple[UInt8[np.ndarray, "h w 4"], tuple[float, float, float, float]]:
     """The world from above as an image, and where its edges are (left, right, bottom, top; m)."""
-    figure = Figure(figsize=(8, 8))
+    figure = Figure(figsize=(16, 16))
     drawn = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     draw_world(axes, world)

@@ -13,10 +13,7 @@ RESIZED_SMOOTHED = {
 }
 
 # The grids that appendices 7.4 to 7.6 searched, decoded from the numbers of their rows (docs/report.md).
-_ALL = {
-    "activation": ("identity", "logistic", "tanh", "relu"),
-    "solver": ("sgd", "adam", "lbfgs"),
-}
+_ALL = {"activation": ("identity", "logistic", "tanh", "relu"), "solver": ("sgd", "adam", "lbfgs")}
 GRIDS = {
     "first_20": _ALL
     | {
@@ -32,6 +29,7 @@ GRIDS = {
     },
     "more_in_corners": _ALL
     | {
+        "activation": ("identity", "logistic", "relu", "tanh"),
         "hidden_layer_sizes": ((20,), (20, 20), (100,), (100, 100)),
         "learning_rate_init": (1e-3, 1e-4, 1e-5),
         "tol": (1e-3, 1e-4, 1e-5),
