@@ -45,7 +45,7 @@ def misplaced(database: Database, rows: Int[np.ndarray, " m"], seed: int = 0) ->
         if len(pairs) < FEWEST_PAIRS:
             return None
         pairs = pairs[rng.permutation(len(pairs))[:MOST_PAIRS]]
-        before, after = (np.stack([_reduced(database, row) for row in column]) for column in pairs.T)
+        before, after = (np.stack([_reduced(database, row) for row in column]) for column in pairs.T.tolist())
         costs = _costs(before, after, database.poses[pairs[:, 0], 2], database.poses[pairs[:, 1], 2])
         costs[:, axis] -= 1e-3  # grey levels: where all are alike, nothing speaks against the label
         votes = np.bincount(costs.argmin(axis=1), minlength=4) / len(pairs)
