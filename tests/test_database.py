@@ -192,7 +192,7 @@ def test_a_folder_with_anything_else_is_refused_and_nothing_touched(tmp_path, re
     assert (tmp_path / "notes" / "notes.txt").read_text() == (tmp_path / "file").read_text() == "mine"
 
 
-MANY = ["--world", "tiny", "--seed", "1", "--size", "24x6", "--spacing-m", "0.06"]  # 51 x 51 views
+MANY = ["--world", "tiny", "--seed", "1", "--size", "24x6", "--spacing-m", "0.08"]  # 38 x 38 views
 
 
 def drawing(out: Path) -> subprocess.Popen:
@@ -215,27 +215,22 @@ def assert_nothing_is_torn(out: Path):
         read_image(path)
 
 
-@pytest.fixture(scope="module")
-def at_once(tmp_path_factory) -> dict[str, bytes]:
-    """What the drawn folder holds that nothing interrupted."""
-    out = tmp_path_factory.mktemp("whole") / "d"
-    with drawing(out) as process:
-        assert process.wait() == 0
-    return contents(out)
-
-
-def test_killed_at_any_moment_it_is_whole_and_goes_on(tmp_path, at_once):
+def test_killed_at_any_moment_it_is_whole_and_goes_on(tmp_path, renderer):
     out, moments = tmp_path / "d", random.Random(4)
     for _ in range(3):
+        drawn = len(list(out.glob("image_*")))
         with drawing(out) as process:
-            time.sleep(moments.uniform(0, 0.5))
+            while len(list(out.glob("image_*"))) == drawn and process.poll() is None:
+                time.sleep(0.002)
+            time.sleep(moments.uniform(0, 0.05))
             process.send_signal(signal.SIGKILL)
         assert_nothing_is_torn(out)
     listed = len(read_database(out)) if (out / ENTRIES).exists() else 0
     with drawing(out) as process:
         result = json.loads(process.communicate()[0])
-    assert (result["images"], result["rendered"]) == (2601, 2601 - listed)
-    assert contents(out) == at_once
+    assert (result["images"], result["rendered"]) == (1444, 1444 - listed)
+    write_database(tmp_path / "at once", renderer, Grid(begin=(0, 0), spacing=0.08, size=(38, 38)))
+    assert contents(out) == contents(tmp_path / "at once")
 
 
 def test_ctrl_c_leaves_what_can_be_completed(tmp_path, capfd):
