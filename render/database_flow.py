@@ -19,9 +19,9 @@ NAMES = ("+x", "+y", "-x", "-y")
 LABELS = ("+x", "+y")
 MOST_PAIRS = 100  # looked at along each axis
 FEWEST_PAIRS = 24  # on fewer nothing is said
-# Of the pairs see the directions of an accusation, and so many more than see those of the labels. In right grids of 8 seeds of every
-# preset (8 x 8 views of 24 x 6 pixels 0.2 m apart, or 26 x 26 of 90 x 25, 0.1 to 0.4 m apart) at least 0.48 of the pairs of
-# either axis see its own direction, and at most 0.27 any other one.
+# An accusation needs this share of the pairs, and so much more than the labels have. In right grids of 8 seeds of every preset
+# (8 x 8 views of 24 x 6 pixels 0.2 m apart, or 26 x 26 of 90 x 25, 0.1 to 0.4 m apart) at least 0.48 of the pairs of either
+# axis see its own direction, and at most 0.27 any other one.
 MAJORITY, MARGIN = 0.45, 0.2
 
 # What it comes to that steps labelled so look like steps in two other directions.
