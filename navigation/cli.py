@@ -82,13 +82,12 @@ def choice_of(commands: dict[str, Any]) -> Any:
     """The type, as tyro reads it, of one of several commands."""
 
     def group(sentence: str, below: dict[str, Any]) -> Any:
-        def chosen(command: Any) -> Any:
+        choice = Annotated[choice_of(below), tyro.conf.arg(name="")]
+
+        def chosen(command: choice) -> Any:  # pyright: ignore[reportInvalidTypeForm] (made from a dictionary)
             return command
 
-        chosen.__doc__, chosen.__annotations__ = (
-            sentence,
-            {"command": Annotated[choice_of(below), tyro.conf.arg(name="")]},
-        )
+        chosen.__doc__ = sentence
         return chosen
 
     kinds = [

@@ -56,12 +56,15 @@ class Database:
     def __len__(self) -> int:
         return len(self.names)
 
-    def views(self, rows: slice | Sequence[int] | None = None) -> UInt8[np.ndarray, "m height width channels"]:
+    def views(
+        self, rows: slice | Sequence[int] | np.ndarray | None = None
+    ) -> UInt8[np.ndarray, "m height width channels"]:
         """The images of rows (all, by default) as RGB, or RGBA as the renderers give; grey ones have three equal channels.
 
         Raises InputError for an image that is missing or damaged, or differs in size from the others.
         """
-        paths = [self._path(row) for row in np.arange(len(self))[slice(None) if rows is None else rows]]
+        chosen = np.arange(len(self))[slice(None) if rows is None else rows].tolist()
+        paths = [self._path(row) for row in chosen]
         with ThreadPoolExecutor() as pool:
             views = list(pool.map(read_image, paths))
         for path, view in zip(paths, views, strict=True):

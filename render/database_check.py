@@ -131,7 +131,7 @@ def names(examined: Examined) -> Iterator[Problem]:
     )
     given = np.column_stack([database.poses[:, :2], database.z]) * 1e3
     off = np.abs(named - given) > 1  # False for nan
-    places, heights = np.flatnonzero(off[:, :2].any(axis=1)), np.flatnonzero(off[:, 2])
+    places, heights = np.flatnonzero(off[:, :2].any(axis=1)).tolist(), np.flatnonzero(off[:, 2]).tolist()
     if len(places):
         swapped = np.abs(named[places][:, [1, 0]] - given[places, :2]).max(axis=1) <= 1
         hint = "; x and y are exchanged" if swapped.mean() > 0.9 else ""
@@ -152,7 +152,7 @@ def headings(examined: Examined) -> Iterator[Problem]:
     judged = np.isfinite(off)
     if examined.database.kind != "route" or not judged.any():
         return
-    median, wrong = np.median(off[judged]), np.flatnonzero(off > OFF_PATH)
+    median, wrong = np.median(off[judged]), np.flatnonzero(off > OFF_PATH).tolist()
     if median > CONVENTION:
         what = f"headings are {np.degrees(median):.0f} degrees off the path (median)"
         yield Problem("heading-convention", ENTRIES, what + _meant(poses))
@@ -180,7 +180,7 @@ def _meant(poses: Float[np.ndarray, "n 3"]) -> str:
     }  # fmt: skip
     off = {name: float(np.nanmedian(_off_path(poses, heading))) for name, heading in others.items()}
     best = min(off, key=lambda name: off[name])
-    return f"; as {best} they would fit" if off[best] < CONVENTION else "; they are not bearings clockwise from +y"
+    return f"; as {best} they would fit" if off[best] < CONVENTION else ", however they are read"
 
 
 def extent(examined: Examined) -> Iterator[Problem]:
@@ -198,7 +198,7 @@ def extent(examined: Examined) -> Iterator[Problem]:
     with np.errstate(all="ignore"):  # whatever the metadata says
         index = (poses[:, :2] * 1e3 - begin[:2]) / np.where(np.array(apart[:2]) > 0, apart[:2], 1)
     inside = (np.abs(index - np.rint(index)) < 0.01) & (index > -0.5) & (index < np.array(size[:2]) - 0.5)
-    wrong = np.flatnonzero(~inside.all(axis=1) & np.isfinite(index).all(axis=1))
+    wrong = np.flatnonzero(~inside.all(axis=1) & np.isfinite(index).all(axis=1)).tolist()
     if len(wrong):
         x, y = poses[wrong[0], :2] * 1e3
         what = f"{len(wrong)} rows are not in the grid of {METADATA}, the first at X {x:g}, Y {y:g}"

@@ -43,7 +43,7 @@ def files(folder: Path) -> set[str]:
 def test_help_names_every_command(capfd):
     code, out, _ = tussock(capfd, "--help")
     assert code == 0
-    names = ("world", "view", "route", "evaluate", "train", "compare", "models", "run", "play")
+    names = ("world", "view", "route", "evaluate", "train", "compare", "models", "run", "play", "database")
     assert all(name in out for name in names)
     for name in names:
         assert tussock(capfd, name, "--help")[0] == 0

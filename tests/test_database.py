@@ -1,0 +1,575 @@
+"""Image databases: what is written comes back to the last bit, whatever interrupts it; what others published can be read."""
+
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from navigation.cli import main
+from navigation.database_commands import DatabaseGridCommand
+from render.database import Database, read_database, read_image
+from render.database_check import check_database
+from render.database_files import ENTRIES, METADATA, as_kept, read_metadata, write_metadata
+from render.database_writing import Grid, write_database
+from render.eye import Eye
+from render.renderer import open_renderer
+from world.errors import InputError
+from world.geometry import Bounds, wrap_angle
+from world.scene import World
+
+WORLD = World.generate("tiny", 1)
+EYE = Eye(width=24, height=6)
+GRID = Grid(begin=(0.2, 0.4), spacing=0.2, size=(5, 3))
+ROUTE = np.column_stack([np.linspace(0.5, 2.5, 9), np.full(9, 1.0), np.zeros(9)])
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    with open_renderer(WORLD, EYE, "cpu") as renderer:
+        yield renderer
+
+
+class Painter:
+    """A renderer that costs nothing."""
+
+    backend = "cpu"
+
+    def __init__(self, eye: Eye = EYE):
+        self.world, self.eye = WORLD, eye
+
+    def render(self, poses):
+        return np.zeros((len(poses), self.eye.height, self.eye.width, 4), dtype=np.uint8)
+
+    def close(self): ...
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_): ...
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file under a folder, the metadata without its time."""
+    found = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return found | {METADATA: re.sub(rb" time: .*", b"", found[METADATA])}
+
+
+# Writing and reading back.
+
+numbers = st.floats(-1e5, 1e5)
+angles = st.one_of(
+    st.floats(-1e3, 1e3), st.sampled_from([np.pi, -np.pi, np.pi / 2, -1e-13, np.nextafter(np.pi, 0), 0.0])
+)
+places = st.lists(st.tuples(numbers, numbers, angles), min_size=1, max_size=4)
+
+
+@given(places)
+@example([(0.0005 / 3, -1e-13, np.radians(90.0000000001)), (0.1 + 0.2, -0.0, -np.pi / 2)])
+@example([(63 / 10, 8.45, np.pi / 2 - np.radians(359.9999999999)), (1 / 3, 2 / 3, np.pi / 2 + 1e-14)])
+def test_poses_come_back_to_the_last_bit(tmp_path_factory, places):
+    kept = as_kept(places)
+    assert as_kept(kept).tobytes() == kept.tobytes()
+    assert np.abs(kept[:, :2] - np.array(places)[:, :2]).max() <= 0.51e-9
+    assert np.abs(wrap_angle(kept[:, 2] - np.array(places)[:, 2])).max() <= np.radians(0.51e-9)
+    assert (kept[:, 2] >= -np.pi).all()
+    assert (kept[:, 2] < np.pi).all()
+    database, rendered = write_database(tmp_path_factory.mktemp("w") / "d", Painter(), places)
+    assert rendered == len(places)
+    assert database.poses.tobytes() == kept.tobytes()
+
+
+def test_a_grid_is_written_as_its_format_says(tmp_path, renderer):
+    database, rendered = write_database(tmp_path / "new" / "g", renderer, GRID)
+    assert rendered == len(database) == 15
+    lines = (tmp_path / "new" / "g" / ENTRIES).read_text().splitlines()
+    assert lines[0] == (
+        "X [mm], Y [mm], Z [mm], Heading [degrees], Pitch [degrees], Roll [degrees], Filename, Grid X, Grid Y, Grid Z"
+    )
+    assert lines[2] == "400, 400, 10, 90, 0, 0, image_+000400_+000400_+000010.png, 1, 0, 0"
+    assert (tmp_path / "new" / "g" / METADATA).read_text().startswith("%YAML:1.0\n---\nmetadata:\n   time: ")
+    metadata = database.metadata
+    assert (database.kind, metadata["type"]) == ("grid", "grid")
+    assert metadata["grid"] == {
+        "beginAtMM": [200.0, 400.0, 10.0], "separationMM": [200.0, 200.0, 0.0], "size": [5, 3, 1],
+    }  # fmt: skip
+    assert metadata["camera"] == {"name": "tussock", "resolution": [24, 6], "isPanoramic": 0}
+    assert metadata["needsUnwrapping"] == metadata["isGreyscale"] == 0
+    assert np.allclose(database.poses, GRID.poses(), rtol=0, atol=1e-12)
+    assert (database.z == 0.01).all()
+    assert np.array_equal(database.views(), renderer.render(database.poses))
+    image = cv2.imread(str(tmp_path / "new" / "g" / database.names[1]), cv2.IMREAD_COLOR)  # as BoB's readers do
+    assert np.array_equal(image[..., ::-1], renderer.render(database.poses[1:2])[0, ..., :3])
+
+
+def test_a_route_is_written_as_its_format_says(tmp_path, renderer):
+    poses = ROUTE + [0, 0, 2.5]
+    database, _ = write_database(tmp_path / "r", renderer, poses)
+    lines = (tmp_path / "r" / ENTRIES).read_text().splitlines()
+    assert lines[0] == "X [mm], Y [mm], Z [mm], Heading [degrees], Pitch [degrees], Roll [degrees], Filename"
+    assert lines[1] == "500, 1000, 10, 306.760551217, 0, 0, image_00000.png"
+    assert database.kind == "route"
+    assert database.poses.tobytes() == as_kept(poses).tobytes()
+    assert np.array_equal(database.views([8, 0]), renderer.render(database.poses[[8, 0]]))
+    assert len(database.views([])) == 0
+
+
+def test_what_is_no_database_to_write_is_refused(tmp_path):
+    for bad in (np.empty((0, 3)), [(np.nan, 0.0, 0.0)], [(2e6, 0.0, 0.0)]):
+        with pytest.raises(InputError):
+            write_database(tmp_path / "d", Painter(), bad)
+    with pytest.raises(InputError, match="whole millimetres"):
+        write_database(tmp_path / "d", Painter(), Grid(begin=(0, 0), spacing=0.0004, size=(3, 3)))
+    assert not (tmp_path / "d").exists()
+
+
+# Going on after an interruption.
+
+
+def test_only_what_is_missing_is_drawn_again(tmp_path, renderer):
+    seen = []
+    whole, _ = write_database(tmp_path / "a", renderer, GRID, lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (15, 15)
+    out = tmp_path / "b"
+    write_database(out, renderer, GRID)
+    before = {path: path.stat().st_mtime_ns for path in out.iterdir()}
+    assert write_database(out, renderer, GRID)[1] == 0
+    assert before == {path: path.stat().st_mtime_ns for path in out.iterdir()}
+    (out / whole.names[3]).unlink()
+    lines = (out / ENTRIES).read_text().splitlines(keepends=True)
+    (out / ENTRIES).write_text("".join(lines[:8] + lines[9:]))
+    (out / f".{whole.names[7][:-4]}.1.partial.png").write_bytes(b"half")
+    (out / ".database_entries.1.partial.csv").write_bytes(b"half")
+    assert write_database(out, renderer, GRID)[1] == 2
+    assert contents(out) == contents(tmp_path / "a")
+
+
+def test_another_world_eye_kind_or_pose_is_refused_and_nothing_touched(tmp_path, renderer):
+    out = tmp_path / "d"
+    write_database(out, renderer, GRID)
+    (out / "image_+000200_+000400_+000010.png").unlink()  # there would be something to do
+    (out / ".image_00000.1.partial.png").write_bytes(b"half")
+    before = {path: path.stat().st_mtime_ns for path in out.iterdir()}
+    with (
+        open_renderer(World.generate("tiny", 2), EYE, "cpu") as other_world,
+        pytest.raises(InputError, match="differs in its world"),
+    ):
+        write_database(out, other_world, GRID)
+    for eye in (Eye(width=26, height=6), Eye(width=24, height=6, top=1.0), Eye(width=24, height=6, samples=2)):
+        with pytest.raises(InputError, match="differs in its eye"):
+            write_database(out, Painter(eye), GRID)
+    with pytest.raises(InputError, match="differs in its type"):
+        write_database(out, renderer, GRID.poses())
+    with pytest.raises(InputError, match="differs in its poses"):
+        write_database(out, renderer, Grid(begin=(0.2, 0.4), spacing=0.2, size=(5, 2)))
+    assert before == {path: path.stat().st_mtime_ns for path in out.iterdir()}
+
+
+def test_a_folder_with_anything_else_is_refused_and_nothing_touched(tmp_path, renderer):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "notes.txt").write_text("mine")
+    for name in ("file", "notes", "file/below"):
+        with pytest.raises(InputError):
+            write_database(tmp_path / name, renderer, ROUTE)
+    theirs = by_hand(tmp_path / "theirs", PUBLISHED)
+    with pytest.raises(InputError, match="version"):
+        write_database(theirs, renderer, ROUTE)
+    write_database(tmp_path / "changed", renderer, ROUTE)
+    (tmp_path / "changed" / ENTRIES).write_text(PUBLISHED)
+    with pytest.raises(InputError, match="was changed"):
+        write_database(tmp_path / "changed", renderer, ROUTE)
+    assert (tmp_path / "notes" / "notes.txt").read_text() == (tmp_path / "file").read_text() == "mine"
+
+
+MANY = ["--world", "tiny", "--seed", "1", "--size", "24x6", "--spacing-m", "0.08"]  # 38 x 38 views
+
+
+def drawing(out: Path) -> subprocess.Popen:
+    """tussock database grid, running."""
+    command = [sys.executable, "-m", "navigation.cli", "database", "grid", *MANY, "--out", str(out), "--json"]
+    here = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    process = subprocess.Popen(command, env=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not (out / METADATA).exists():
+        assert process.poll() is None
+        time.sleep(0.005)
+    return process
+
+
+def assert_nothing_is_torn(out: Path):
+    database = read_database(out) if (out / ENTRIES).exists() else None
+    if database is not None:
+        assert database.names == database.columns["Filename"]
+        assert len(database.views()) == len(database)
+    for path in out.glob("image_*"):
+        read_image(path)
+
+
+def test_killed_at_any_moment_it_is_whole_and_goes_on(tmp_path, renderer):
+    out, moments = tmp_path / "d", random.Random(4)
+    for _ in range(3):
+        drawn = len(list(out.glob("image_*")))
+        with drawing(out) as process:
+            while len(list(out.glob("image_*"))) == drawn and process.poll() is None:
+                time.sleep(0.002)
+            time.sleep(moments.uniform(0, 0.05))
+            process.send_signal(signal.SIGKILL)
+        assert_nothing_is_torn(out)
+    listed = len(read_database(out)) if (out / ENTRIES).exists() else 0
+    with drawing(out) as process:
+        result = json.loads(process.communicate()[0])
+    assert (result["images"], result["rendered"]) == (1444, 1444 - listed)
+    write_database(tmp_path / "at once", renderer, Grid(begin=(0, 0), spacing=0.08, size=(38, 38)))
+    assert contents(out) == contents(tmp_path / "at once")
+
+
+def test_ctrl_c_leaves_what_can_be_completed(tmp_path, capfd):
+    out = tmp_path / "d"
+    with drawing(out) as process:
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        err = process.communicate()[1]
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "tussock: interrupted"
+    assert_nothing_is_torn(out)
+    assert not list(out.glob(".*"))
+
+
+# Reading what others wrote.
+
+PUBLISHED = (
+    "X [mm], Y [mm], Z [mm], Heading [degrees], Filename\n"
+    "6300, 8450, 10, -90, image_00000.png\n6290, 8450, 10, 270, image_00001.png\n6290, 8440, 10, 180, image_00002.png\n"
+)
+YAML = """%YAML:1.0
+---
+metadata:
+   time: "2019-02-11 10:02:30"
+   type: route
+   camera:
+      name: panoramic
+      resolution: [ 8, 4 ]
+      isPanoramic: 0
+   needsUnwrapping: 0
+   isGreyscale: 0
+"""
+
+
+def by_hand(
+    folder: Path, entries: str | bytes, yaml: str | bytes = YAML, images: int = 3, ending: str = ".png"
+) -> Path:
+    """A folder with the given texts and images of 8 x 4 pixels."""
+    folder.mkdir(exist_ok=True)
+    for name, text in ((ENTRIES, entries), (METADATA, yaml)):
+        (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
+    for i in range(images):
+        cv2.imwrite(str(folder / f"image_{i:05d}{ending}"), np.full((4, 8, 3), [10 * i, 50, 200], dtype=np.uint8))
+    return folder
+
+
+def test_a_published_route_is_read(tmp_path):
+    database = read_database(by_hand(tmp_path / "d", PUBLISHED))
+    assert database.kind == "route"
+    assert np.allclose(database.poses, [(6.3, 8.45, -np.pi), (6.29, 8.45, -np.pi), (6.29, 8.44, -np.pi / 2)])
+    assert database.z.tolist() == [0.01] * 3
+    assert database.views().tolist()[1][0][0] == [200, 50, 10]  # RGB
+    assert check_database(tmp_path / "d") == []
+
+
+VARIANTS = {
+    "another order": (
+        "Filename, Heading [degrees], Z [mm], Y [mm], X [mm]\n"
+        "image_00000.png, 270, 10, 8450, 6300\nimage_00001.png, 270, 10, 8450, 6290\nimage_00002.png, -180, 10, 8440, 6290\n"
+    ),
+    "no spaces": PUBLISHED.replace(", ", ","),
+    "CRLF": PUBLISHED.replace("\n", "\r\n"),
+    "a BOM": b"\xef\xbb\xbf" + PUBLISHED.encode(),
+    "no last newline": PUBLISHED.rstrip(),
+    "empty lines": PUBLISHED.replace("\n", "\n\n"),
+    "decimals": PUBLISHED.replace("6300", "6300.000"),
+    "commas at the ends": PUBLISHED.replace("\n", ",\n"),
+    "spaces": PUBLISHED.replace(", ", "  ,  "),
+    "quotes": PUBLISHED.replace("image_00000.png", '"image_00000.png"'),
+    "pitch and roll": PUBLISHED.replace("[degrees], F", "[degrees], Pitch [degrees], Roll [degrees], F").replace(
+        ", image", ", 0, , image"
+    ),
+    "turned further": PUBLISHED.replace("-90", "270").replace("180", "-540"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_published_variants_read_alike(tmp_path, variant):
+    expected = read_database(by_hand(tmp_path / "a", PUBLISHED))
+    database = read_database(by_hand(tmp_path / "b", VARIANTS[variant]))
+    assert database.poses.tobytes() == expected.poses.tobytes()
+    assert database.names == expected.names
+    assert np.array_equal(database.z, expected.z)
+
+
+def test_names_from_one_missing_cells_and_opencv_5(tmp_path):
+    entries = 'X [mm], Y [mm], Heading [degrees], Filename, Note\n1000,,90, image00001.jpg\n, 2000, , ,"a, b"\n'
+    database = read_database(by_hand(tmp_path / "d", entries, YAML.replace("%YAML:1.0", "%YAML 1.2"), images=0))
+    assert database.names == ("image00001.jpg", None)
+    assert np.array_equal(database.poses, [(1.0, np.nan, 0.0), (np.nan, 2.0, np.nan)], equal_nan=True)
+    assert np.isnan(database.z).all()
+    assert database.columns["Note"] == ("", "a, b")
+    with pytest.raises(InputError, match="row 1 names no image"):
+        database.views([1])
+    with pytest.raises(InputError, match=r"there is no image .*image00001\.jpg"):
+        database.views([0])
+
+
+def test_grey_images_have_three_equal_channels_and_sizes_must_agree(tmp_path):
+    folder = by_hand(tmp_path / "d", PUBLISHED)
+    grey = np.arange(32, dtype=np.uint8).reshape(4, 8)
+    cv2.imwrite(str(folder / "image_00000.png"), grey)
+    assert np.array_equal(read_database(folder).views([0])[0], np.stack([grey] * 3, axis=2))
+    assert len(read_database(folder).views()) == 3
+    cv2.imwrite(str(folder / "image_00000.png"), grey[:3])
+    with pytest.raises(InputError, match=r"image_00001\.png is 8 x 4 x 3, image_00000\.png is 8 x 3 x 3"):
+        read_database(folder).views()
+    for damaged in (b"", b"GIF89a", (folder / "image_00001.png").read_bytes()[:-5]):
+        (folder / "image_00000.png").write_bytes(damaged)
+        with pytest.raises(InputError, match=r"image_00000\.png cannot be read"):
+            read_database(folder).views()
+    cv2.imwrite(str(folder / "image_00000.png"), grey.astype(np.uint16))
+    with pytest.raises(InputError, match="8 bits"):
+        read_database(folder).views()
+
+
+BAD = {
+    "a video": (PUBLISHED.replace("Filename", "Frame"), YAML, "frames of a video"),
+    "no X": (PUBLISHED.replace("X [mm]", "X [m]"), YAML, r"line 1: there is no column 'X \[mm\]'"),
+    "no names": (PUBLISHED.replace("Filename", "File"), YAML, "line 1: there is no column 'Filename'"),
+    "two X": (PUBLISHED.replace("Y [mm]", "X [mm]"), YAML, r"line 1: the column 'X \[mm\]' stands twice"),
+    "text for a number": (PUBLISHED.replace("8440", "north"), YAML, r"line 4: Y \[mm\] is 'north'"),
+    "nan": (PUBLISHED.replace("180", "nan"), YAML, r"line 4: Heading \[degrees\] is 'nan'"),
+    "too large": (PUBLISHED.replace("8440", "1e300"), YAML, r"line 4: Y \[mm\] is '1e300'"),
+    "too many cells": (PUBLISHED.replace("10, 180", "10, 5, 180"), YAML, "line 4: 6 cells under 5 columns"),
+    "no text": (b"\xff\xfe" + PUBLISHED.encode("utf-16-le"), YAML, "cannot be read as CSV"),
+    "a cell without end": ('X [mm]\n"' + "1" * 200_000, YAML, "cannot be read as CSV"),
+    "an empty file": ("", YAML, "line 1: there is no column"),
+    "an absolute name": (PUBLISHED.replace("image_00001.png", "/etc/hosts"), YAML, "line 3: '/etc/hosts' is not in the folder"),
+    "a name above": (PUBLISHED.replace("image_00001.png", "../d.png"), YAML, r"line 3: '\.\./d\.png' is not in the folder"),
+    "a link out": (PUBLISHED.replace("image_00001.png", "link.png"), YAML, r"line 3: 'link\.png' is not in the folder"),
+    "damaged YAML": (PUBLISHED, YAML + "   a: [ 1, 2\n", "line 1[0-9].* cannot be read as a database's YAML"),
+    "other YAML": (PUBLISHED, "%YAML:1.0\n---\nother: 1\n", "no 'metadata'"),
+    "another type": (PUBLISHED, YAML.replace("type: route", "type: film"), "the type is 'film'"),
+    "no type": (PUBLISHED, YAML.replace("type: route", "kind: route"), "the type is None"),
+    "deep YAML": (PUBLISHED, YAML + "   a: " + "[" * 200_000, "nested too deeply"),
+    "XML": (PUBLISHED, '<?xml version="1.0"?><opencv_storage>' + "<a>" * 200_000, "nested too deeply"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_damaged_databases_are_refused_in_one_line(tmp_path, what):
+    entries, yaml, message = BAD[what]
+    folder = by_hand(tmp_path / "d", entries, yaml)
+    (tmp_path / "d.png").write_bytes((folder / "image_00000.png").read_bytes())
+    (folder / "link.png").symlink_to(tmp_path / "d.png")
+    with pytest.raises(InputError, match=message) as refusal:
+        read_database(folder)
+    assert "\n" not in str(refusal.value)
+    assert str(folder) in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", [ENTRIES, METADATA])
+def test_missing_files_are_named(tmp_path, name):
+    folder = by_hand(tmp_path / "d", PUBLISHED)
+    (folder / name).unlink()
+    with pytest.raises(InputError, match=f"there is no .*{name}"):
+        read_database(folder)
+
+
+@st.composite
+def damaged(draw, text: str) -> bytes:
+    """A text with some bytes replaced, or any bytes at all."""
+    data = bytearray(text.encode())
+    for _ in range(draw(st.integers(1, 3))):
+        at, length = draw(st.integers(0, len(data))), draw(st.integers(0, 8))
+        data[at : at + length] = draw(
+            st.binary(max_size=8) | st.sampled_from([b"\n", b",", b'"', b": ", b"- ", b"[", b"\0"])
+        )
+    return bytes(data)
+
+
+@settings(max_examples=150)
+@given(
+    entries=damaged(PUBLISHED) | st.binary(max_size=99) | st.just(PUBLISHED.encode()),
+    yaml=damaged(YAML) | st.just(YAML.encode()),
+)
+def test_any_bytes_are_read_or_refused(tmp_path_factory, entries, yaml):
+    folder = by_hand(tmp_path_factory.getbasetemp() / "fuzzed", entries, yaml)
+    check_database(folder)
+    try:
+        database = read_database(folder)
+    except InputError as error:
+        assert "\n" not in str(error)  # noqa: PT017
+    else:
+        assert len(database) == len(database.poses) == len(database.z)
+
+
+# Copies.
+
+STRANGE = (
+    YAML
+    + """   unwrapper:
+      centre: [ 0.5, 1e-3, -7 ]
+      flipped: 1
+      note: "it's \\"true\\""
+   matrix: !!opencv-matrix
+      rows: 1
+      cols: 2
+      dt: d
+      data: [ 1., 2.5 ]
+   list: [ [ 1, 2 ], { a: x, b: [ ] }, "" ]
+"""
+)
+
+
+def test_a_copy_loses_nothing_and_its_copy_is_the_same(tmp_path):
+    entries = PUBLISHED.replace("Filename\n", 'Filename, GPS, "a, ""b"""\n').replace(
+        "00000.png", '00000.png,  51.5,"x, y"'
+    )
+    first = read_database(by_hand(tmp_path / "a", entries, STRANGE))
+    second = first.write(tmp_path / "b")
+    third = second.write(tmp_path / "c")
+    assert contents(tmp_path / "b") == contents(tmp_path / "c")
+    for other in (second, third):
+        assert list(other.columns.items()) == list(first.columns.items())
+        assert other.metadata == first.metadata
+        assert np.array_equal(other.views(), first.views())
+    assert first.columns['a, "b"'] == ("x, y", "", "")
+    assert first.metadata["unwrapper"] == {"centre": [0.5, 0.001, -7], "flipped": 1, "note": 'it\'s "true"'}
+    assert first.metadata["list"] == [[1, 2], {"a": "x", "b": []}, ""]
+    assert "!!opencv-matrix" in (tmp_path / "b" / METADATA).read_text()
+    with pytest.raises(InputError, match="new folder"):
+        first.write(tmp_path / "b")
+    (tmp_path / "a" / "image_00001.png").unlink()
+    with pytest.raises(InputError, match=r"no image .*image_00001\.png"):
+        first.write(tmp_path / "d")
+
+
+def test_a_drawn_database_is_copied_as_it_is(tmp_path, renderer):
+    database, _ = write_database(tmp_path / "a", renderer, GRID)
+    assert isinstance(database.write(tmp_path / "b"), Database)
+    assert contents(tmp_path / "b") == contents(tmp_path / "a")
+
+
+keys = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,6}", fullmatch=True)
+texts = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"]), max_size=9) | st.sampled_from(
+    ["true", "null", "1e5", "~", '"', "'", " a ", "a: b", "- a", "\n", "\\"]
+)
+values = st.none() | st.integers(-(2**31), 2**31 - 1) | st.floats(allow_nan=False) | texts
+
+
+@settings(max_examples=50)
+@given(
+    st.dictionaries(keys, st.recursive(values, lambda each: st.lists(each) | st.dictionaries(keys, each), max_leaves=8))
+)
+def test_metadata_comes_back(tmp_path_factory, metadata):
+    path = tmp_path_factory.getbasetemp() / METADATA
+    write_metadata(path, metadata)
+    assert read_metadata(path) == metadata
+
+
+def test_metadata_that_would_not_come_back_is_refused(tmp_path):
+    for metadata in ({"a: b": 1}, {"a": "\x07"}, {"a": 2**70}):
+        with pytest.raises(InputError, match="cannot be kept"):
+            write_metadata(tmp_path / METADATA, metadata)
+    assert not (tmp_path / METADATA).exists()
+
+
+# The command line.
+
+SMALL = ["--world", "tiny", "--seed", "1", "--size", "24x6"]
+
+
+def tussock(capfd, *arguments) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command, run in this process."""
+    capfd.readouterr()
+    code = 0
+    try:
+        main(["database", *map(str, arguments)])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    return code, *capfd.readouterr()
+
+
+def test_a_grid_from_the_command_line(capfd, tmp_path):
+    out = tmp_path / "g"
+    code, printed, err = tussock(capfd, "grid", *SMALL, "--out", out, "--json")
+    result = json.loads(printed)
+    assert (code, err) == (0, "renderer: cpu\n")
+    assert list(result) == ["database", "type", "images", "rendered", "seconds"]
+    assert (result["type"], result["images"], result["rendered"]) == ("grid", 256, 256)
+    database = read_database(out)
+    assert np.allclose(database.poses[[0, 1, 255]], [(0, 0, 0), (0.2, 0, 0), (3, 3, 0)])
+    assert "rendered  0" in tussock(capfd, "grid", *SMALL, "--out", out)[1]
+    tussock(
+        capfd, "grid", *SMALL, "--out", tmp_path / "part", "--from-m", "0.3,1", "--to-m", "1,1.05", "--spacing-m", 0.1
+    )
+    assert np.allclose(read_database(tmp_path / "part").poses[:, :2], [(x / 10, 1) for x in range(3, 11)])
+
+
+def test_a_grid_is_the_published_one_by_default():
+    command = DatabaseGridCommand(out=Path("g"))
+    for field in (Bounds(0, 0, 10, 10), Bounds(-0.16, -0.23, 10.24, 10.09)):  # of the presets and the Sussex world
+        grid = command.grid(field, None, None)
+        assert (grid.begin, grid.spacing, grid.size) == ((0.0, 0.0), 0.2, (51, 51))
+        assert field.contains(*grid.poses()[:, :2].T).all()
+
+
+def test_a_route_from_the_command_line_and_its_check(capfd, tmp_path):
+    (tmp_path / "r.csv").write_text("x_m,y_m,heading_deg\n0.5,0.5,0\n2.49,0.5,0\n2.5,0.5,90\n2.5,2.5,90\n")
+    out = tmp_path / "r"
+    code, printed, _ = tussock(capfd, "route", *SMALL, "--route", tmp_path / "r.csv", "--out", out, "--json")
+    assert code == 0
+    assert json.loads(printed)["images"] == 267
+    assert np.allclose(read_database(out).poses[[0, 1]], [(0.5, 0.5, 0), (0.515, 0.5, 0)])
+    code, printed, _ = tussock(capfd, "check", out, "--json")
+    assert code == 0
+    assert json.loads(printed) == {"database": str(out), "type": "route", "images": 267, "problems": [], "ok": True}
+    (out / "image_00003.png").unlink()
+    code, printed, _ = tussock(capfd, "check", out, "--json")
+    problem = {"kind": "missing-image", "where": f"{ENTRIES}, line 5", "what": "there is no image_00003.png"}
+    assert (code, json.loads(printed)["problems"], json.loads(printed)["ok"]) == (1, [problem], False)
+    code, printed, err = tussock(capfd, "check", out)
+    assert (code, err) == (1, "")
+    assert f"missing-image  {ENTRIES}, line 5  there is no image_00003.png\n" in printed
+
+
+BAD_FLAGS = {
+    "no spacing": (["grid", *SMALL, "--out", "d", "--spacing-m", "0"], "--spacing-m 0"),
+    "too many views": (["grid", *SMALL, "--out", "d", "--spacing-m", "0.001"], "3001 x 3001 places"),
+    "corners exchanged": (["grid", *SMALL, "--out", "d", "--from-m", "2,2", "--to-m", "1,1"], "0 x 0 places"),
+    "a corner outside": (["grid", *SMALL, "--out", "d", "--to-m", "9,9"], "--to-m 9,9: that is outside the world"),
+    "a corner that is none": (["grid", *SMALL, "--out", "d", "--from-m", "1"], "give X,Y"),
+    "a spacing over the route": (["route", *SMALL, "--out", "d", "--spacing-m", "99"], "does not fit a route"),
+    "a missing route": (["route", *SMALL, "--out", "d", "--route", "r.csv"], r"no route file r\.csv"),
+    "a file for a folder": (["grid", *SMALL, "--out", "file"], "file is there already"),
+    "nothing to check": (["check", "nowhere"], "there is no nowhere/database_entries.csv"),
+}
+
+
+@pytest.mark.parametrize("what", BAD_FLAGS)
+def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkeypatch, what):
+    arguments, message = BAD_FLAGS[what]
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("mine")
+    code, out, err = tussock(capfd, *arguments)
+    assert (code, out) == (2, "")
+    lines = [line for line in err.splitlines() if line != "renderer: cpu"]
+    assert len(lines) == 1, err
+    assert re.search(message, lines[0]), lines
+    assert os.listdir() == ["file"]

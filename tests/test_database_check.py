@@ -1,0 +1,314 @@
+"""Each fault that a database can have is found, and only that; what is right is not accused."""
+
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from render.database import read_database
+from render.database_check import Problem, check_database
+from render.database_files import ENTRIES, METADATA, read_metadata, write_metadata
+from render.database_writing import Grid, write_database
+from render.eye import Eye
+from render.renderer import open_renderer
+from world.errors import InputError
+from world.files import read_route, read_world
+from world.scene import World
+
+EYE = Eye(width=24, height=6)
+SIDE = 8
+GRID = Grid(begin=(0.4, 0.4), spacing=0.2, size=(SIDE, SIDE))
+
+
+def curve(n: int = 40) -> np.ndarray:
+    """Poses (n, 3) along a bend, facing along it."""
+    turn = np.linspace(0, np.pi / 2, n)
+    return np.column_stack([1 + np.sin(turn), 2 - np.cos(turn), turn])
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory) -> Path:
+    """A folder with a right grid and a right route."""
+    folder = tmp_path_factory.mktemp("right")
+    with open_renderer(World.generate("tiny", 1), EYE, "cpu") as renderer:
+        write_database(folder / "grid", renderer, GRID)
+        write_database(folder / "route", renderer, curve())
+    return folder
+
+
+@pytest.fixture
+def grid(right, tmp_path) -> Path:
+    return Path(shutil.copytree(right / "grid", tmp_path / "grid"))
+
+
+@pytest.fixture
+def route(right, tmp_path) -> Path:
+    return Path(shutil.copytree(right / "route", tmp_path / "route"))
+
+
+def replace(path: Path, *changes: tuple[str, str]) -> None:
+    text = path.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+
+
+def only(folder: Path, kind: str) -> Problem:
+    """The one problem that a database has."""
+    (problem,) = check_database(folder)
+    assert problem.kind == kind
+    return problem
+
+
+def test_right_databases_have_no_problems(grid, route):
+    assert check_database(grid) == check_database(route) == []
+
+
+def test_no_database_is_refused(tmp_path):
+    with pytest.raises(InputError, match=ENTRIES):
+        check_database(tmp_path)
+
+
+# Files.
+
+
+def test_missing_images(route):
+    (route / "image_00007.png").unlink()
+    assert only(route, "missing-image").where == f"{ENTRIES}, line 9"
+
+
+def test_a_row_that_names_no_image(route):
+    replace(route / ENTRIES, ("image_00007.png", ""))
+    (route / "image_00007.png").unlink()
+    assert only(route, "missing-image").what == "the row names no image"
+
+
+def test_truncated_images_and_such_that_are_none(route):
+    path = route / "image_00007.png"
+    whole = path.read_bytes()
+    for data in (whole[:-20], whole[:30], b"", b"text"):
+        path.write_bytes(data)
+        assert only(route, "unreadable-image").where == "image_00007.png"
+
+
+def test_images_of_another_size(route):
+    cv2.imwrite(str(route / "image_00007.png"), np.zeros((6, 25, 3), dtype=np.uint8))
+    problem = only(route, "image-size")
+    assert (problem.where, problem.what) == ("image_00007.png", "it is 25 x 6, most images are 24 x 6")
+
+
+def test_a_resolution_that_no_image_has(route):
+    replace(route / METADATA, ("[ 24, 6 ]", "[ 720, 150 ]"))
+    assert only(route, "image-size") == Problem(
+        "image-size", METADATA, "the resolution is 720 x 150, most images are 24 x 6"
+    )
+
+
+def test_images_that_no_row_names(route):
+    shutil.copy(route / "image_00007.png", route / "extra.PNG")
+    (route / "notes.txt").write_text("mine")
+    assert only(route, "unlisted-image").where == "extra.PNG"
+
+
+def test_rows_that_stand_twice(route):
+    lines = (route / ENTRIES).read_text().splitlines(keepends=True)
+    (route / ENTRIES).write_text("".join([*lines[:9], lines[8], *lines[9:]]))
+    assert only(route, "row-twice") == Problem(
+        "row-twice", f"{ENTRIES}, line 10", "image_00007.png stands in line 9 already"
+    )
+
+
+@pytest.mark.parametrize("name", ["/etc/hostname", "../secret.png", "link.png"])
+def test_names_that_leave_the_folder_are_never_opened(route, monkeypatch, name):
+    secret = route.parent / "secret.png"
+    shutil.move(route / "image_00007.png", secret)
+    (route / "link.png").symlink_to(secret)
+    replace(route / ENTRIES, ("image_00007.png", name))
+    if name != "link.png":
+        (route / "link.png").unlink()
+    opened, read_bytes = [], Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: (opened.append(path.resolve()), read_bytes(path))[1])
+    problem = only(route, "name-leaves-folder")
+    assert problem.where == f"{ENTRIES}, line 9"
+    assert len(opened) == 39
+    assert all(path.is_relative_to(route.resolve()) for path in opened)
+
+
+def test_damaged_metadata_and_entries(route):
+    (route / METADATA).write_text("%YAML:1.0\n---\nmetadata: [\n")
+    assert only(route, "damaged-metadata").where == METADATA
+    (route / METADATA).unlink()
+    assert "there is no" in only(route, "damaged-metadata").what
+    write_metadata(route / METADATA, {"type": "film"})
+    assert "'film'" in only(route, "damaged-metadata").what
+    write_metadata(route / METADATA, {"type": "route"})
+    replace(route / ENTRIES, ("image_00007.png", "image_00007.png, 5"))
+    assert "line 9" in only(route, "damaged-entries").what
+
+
+@pytest.mark.parametrize("strange", [1, "x", [], {}, {"resolution": "x", "size": [1], "views": {}}, [None]])
+def test_metadata_of_another_shape_is_no_reason_to_stop(grid, strange):
+    metadata = read_metadata(grid / METADATA)
+    write_metadata(grid / METADATA, metadata | dict.fromkeys(("grid", "camera", "tussock", "needsUnwrapping"), strange))
+    assert check_database(grid) == []
+
+
+# Numbers.
+
+
+def test_heights_that_are_not_those_in_the_names(grid):
+    replace(grid / ENTRIES, (", 10, 90,", ", 200, 90,"))
+    problem = only(grid, "height-differs-from-name")
+    assert problem.what == "Z of 64 rows is not their images' names', the first 200 for 10"
+
+
+def test_places_that_are_not_those_in_the_names(grid):
+    a, b = (f"image_+000{x}00_+000400_+000010.png" for x in (6, 8))
+    replace(grid / ENTRIES, (a, "a.png"), (b, a), ("a.png", b))
+    problem = only(grid, "place-differs-from-name")
+    assert problem.what == "2 rows stand elsewhere than their images' names say, the first at X 600, Y 400"
+
+
+def test_names_with_x_and_y_exchanged(grid):
+    for path in sorted(grid.glob("*.png")):
+        image, x, y, z = path.stem.split("_")
+        path.rename(grid / f"{image}_{y}_{x}_{z}.new")
+    for path in grid.glob("*.new"):
+        path.rename(path.with_suffix(".png"))
+    lines = [line.split(", ") for line in (grid / ENTRIES).read_text().splitlines()]
+    for cells in lines[1:]:
+        image, x, y, z = cells[6].removesuffix(".png").split("_")
+        cells[6] = f"{image}_{y}_{x}_{z}.png"
+    (grid / ENTRIES).write_text("".join(", ".join(cells) + "\n" for cells in lines))
+    assert only(grid, "place-differs-from-name").what.endswith("the first at X 600, Y 400; x and y are exchanged")
+
+
+def headed(folder: Path, bearing) -> None:
+    """Give each row the bearing (degrees) that a function of its right one gives."""
+    lines = [line.split(", ") for line in (folder / ENTRIES).read_text().splitlines()]
+    for row, cells in enumerate(lines[1:]):
+        cells[3] = f"{bearing(row, float(cells[3])):.3f}"
+    (folder / ENTRIES).write_text("".join(", ".join(cells) + "\n" for cells in lines))
+
+
+def test_single_headings_off_the_path(route):
+    headed(route, lambda row, degrees: degrees + (100 if row in (7, 9) else 50 if row == 20 else -360))
+    problem = only(route, "heading-off-path")
+    assert problem.where == f"{ENTRIES}, line 9"
+    assert problem.what.startswith("2 headings are over 60 degrees off the path, the first by 99")
+
+
+@pytest.mark.parametrize(
+    ("bearing", "reading"),
+    [
+        (lambda row, degrees: 90 - degrees, "counter-clockwise from +x"),
+        (lambda row, degrees: degrees - 90, "clockwise from +x"),
+        (lambda row, degrees: -degrees, "counter-clockwise from +y"),
+        (lambda row, degrees: degrees + 180, "bearings backwards"),
+        (lambda row, degrees: degrees + 130, "however they are read"),
+    ],
+)
+def test_headings_in_another_convention(route, bearing, reading):
+    headed(route, bearing)
+    problem = only(route, "heading-convention")
+    assert reading in problem.what
+    assert "degrees off the path (median)" in problem.what
+
+
+@pytest.mark.parametrize(
+    "change", [("[ 400.0, 400.0, 10.0 ]", "[ 500.0, 400.0, 10.0 ]"), ("[ 200.0, 200.0, 0.0 ]", "[ 100.0, 200.0, 0.0 ]")]
+)
+def test_grids_that_are_not_where_their_metadata_says(grid, change):
+    replace(grid / METADATA, change)
+    assert "the first at X 400, Y 400" in only(grid, "grid-metadata").what or "100.0" in change[1]
+
+
+def test_grids_smaller_or_larger_than_their_rows(grid):
+    replace(grid / METADATA, ("[ 8, 8, 1 ]", "[ 8, 7, 1 ]"))
+    assert only(grid, "grid-metadata").what.startswith("8 rows are not in the grid")
+    replace(grid / METADATA, ("[ 8, 7, 1 ]", "[ 8, 9, 1 ]"), ("views: 64", "seen: 64"))
+    assert only(grid, "rows-missing").what.startswith("64 rows of 72")
+
+
+def test_interrupted_databases(route):
+    lines = (route / ENTRIES).read_text().splitlines(keepends=True)
+    (route / ENTRIES).write_text("".join(lines[:31]))
+    for i in range(30, 40):
+        (route / f"image_{i:05d}.png").unlink()
+    assert only(route, "rows-missing").what.startswith("30 rows of 40")
+
+
+# The axes of grids, by what the views show.
+
+
+def relabelled(folder: Path, out: Path, source) -> Path:
+    """A copy in which the place in column i and row j has the image of the place source(i, j)."""
+    shutil.copytree(folder, out)
+    names = read_database(folder).names
+    for k, name in enumerate(names):
+        i, j = source(k % SIDE, k // SIDE)
+        shutil.copy(folder / (names[j * SIDE + i] or ""), out / (name or ""))
+    return out
+
+
+LAST = SIDE - 1
+MISLABELLED = {
+    "transposed": (lambda i, j: (j, i), "+y, those along +y like +x: x and y are exchanged (the grid is transposed)"),
+    "x mirrored": (lambda i, j: (LAST - i, j), "x is mirrored"),
+    "y mirrored": (lambda i, j: (i, LAST - j), "y is mirrored"),
+    "both": (lambda i, j: (LAST - i, LAST - j), "both axes are mirrored, or the views face backwards"),
+    "both, transposed": (lambda i, j: (LAST - j, LAST - i), "x and y are exchanged and mirrored"),
+}
+
+
+@pytest.mark.parametrize("what", MISLABELLED)
+def test_exchanged_and_mirrored_axes(right, tmp_path, what):
+    source, message = MISLABELLED[what]
+    assert message in only(relabelled(right / "grid", tmp_path / "g", source), "grid-axes").what
+
+
+@pytest.mark.parametrize(
+    ("turn", "message"), [(90, "90 degrees to the left"), (-90, "90 degrees to the right"), (180, "face backwards")]
+)
+def test_views_that_face_elsewhere_than_their_headings_say(grid, turn, message):
+    with open_renderer(World.generate("tiny", 1), EYE, "cpu") as renderer:
+        views = renderer.render(GRID.poses() + [0, 0, np.radians(turn)])
+    for name, view in zip(read_database(grid).names, views, strict=True):
+        cv2.imwrite(str(grid / (name or "")), cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA))
+    assert message in only(grid, "grid-axes").what
+    headed(grid, lambda row, degrees: degrees - turn)  # bearings are clockwise
+    assert check_database(grid) == []
+
+
+def test_what_is_no_panorama_or_shows_nothing_is_not_accused(right, tmp_path):
+    folder = relabelled(right / "grid", tmp_path / "g", lambda i, j: (j, i))
+    replace(folder / METADATA, ("needsUnwrapping: 0", "needsUnwrapping: 1"))
+    assert check_database(folder) == []
+    replace(folder / METADATA, ("needsUnwrapping: 1", "needsUnwrapping: 0"))
+    for path in folder.glob("*.png"):
+        cv2.imwrite(str(path), np.full((6, 24, 3), 90, dtype=np.uint8))
+    assert check_database(folder) == []
+
+
+@pytest.mark.parametrize(
+    ("preset", "seed"),
+    [("tiny", 0), ("tiny", 2), ("tiny", 3), ("tiny", 4), ("tussock-field", 0), ("meadow", 2), ("scrub", 1)],
+)
+def test_right_grids_are_not_accused_and_transposed_ones_are(tmp_path, preset, seed):
+    with open_renderer(World.generate(preset, seed), EYE, "cpu") as renderer:
+        write_database(tmp_path / "right", renderer, GRID)
+    assert check_database(tmp_path / "right") == []
+    assert "transposed" in only(relabelled(tmp_path / "right", tmp_path / "g", lambda i, j: (j, i)), "grid-axes").what
+
+
+def test_the_sussex_grid_and_routes_are_right(tmp_path, sussex):
+    grid = Grid(begin=(2, 2), spacing=0.2, size=(30, 20))
+    with open_renderer(read_world(sussex / "world5000_gray.bin"), Eye(width=90, height=19), "cpu") as renderer:
+        write_database(tmp_path / "grid", renderer, grid)
+        assert check_database(tmp_path / "grid") == []
+        for name in ("ant1_route1", "ant4_route1"):
+            write_database(tmp_path / name, renderer, read_route(sussex / f"{name}.bin").resampled(0.05).poses)
+            assert check_database(tmp_path / name) == []
