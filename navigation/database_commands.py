@@ -10,7 +10,7 @@ import tyro
 
 from world.errors import InputError
 
-from .options import PathOptions, SightOptions
+from .options import ROUTE_SPACING, PathOptions, SightOptions
 from .sight_commands import numbers
 from .terminal import progress, say
 
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from world.geometry import Bounds
     from world.scene import World
 
-CORNERS = (0.0, 0.0), (10.0, 10.0)  # m; of the published grid
 FINEST = 0.001  # m
-MOST_VIEWS = 10**6
 
 
 @dataclass(kw_only=True)
@@ -43,34 +41,23 @@ class DatabaseGridCommand(SightOptions):
     def run(self) -> dict[str, Any]:
         if not (math.isfinite(self.spacing_m) and self.spacing_m >= FINEST):
             raise InputError(f"--spacing-m {self.spacing_m:g}: give at least {FINEST:g}; names hold whole millimetres")
-        corners = [
+        low, high = (
             None if text is None else numbers(text, flag, "X,Y", "0,0")
             for text, flag in ((self.from_m, "--from-m"), (self.to_m, "--to-m"))
-        ]
+        )
         world = self.open_world()
-        return write(self, world, self.grid(world.field, *corners), self.out)
+        return write(self, world, self.grid(world.field, low, high), self.out)
 
     def grid(self, field: "Bounds", low: tuple[float, ...] | None, high: tuple[float, ...] | None) -> "Grid":
         """The grid from one corner to the other (m), each by default the published grid's or the field's."""
-        from render.database_writing import Grid
+        from render.database_writing import Grid, published_part
+        from world.geometry import Bounds
 
         for flag, corner in (("--from-m", low), ("--to-m", high)):
             if corner is not None and not field.contains(*corner):
                 raise InputError(f"{flag} {corner[0]:g},{corner[1]:g}: that is outside the world ({field})")
-        low = low or tuple(map(max, CORNERS[0], field[:2]))
-        high = high or tuple(map(min, CORNERS[1], field[2:]))
-        # A billionth of a spacing beyond the corners: 0.6 / 0.2 is not quite 3.
-        first = [math.ceil(corner / self.spacing_m - 1e-9) for corner in low]
-        size = [
-            math.floor(corner / self.spacing_m + 1e-9) - start + 1 for corner, start in zip(high, first, strict=True)
-        ]
-        if min(size) < 1 or size[0] * size[1] > MOST_VIEWS:
-            raise InputError(
-                f"a grid of {self.spacing_m:g} m from {low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g} has "
-                f"{max(0, size[0])} x {max(0, size[1])} places; give another --spacing-m, --from-m or --to-m"
-            )
-        begin = first[0] * self.spacing_m, first[1] * self.spacing_m
-        return Grid(begin=begin, spacing=self.spacing_m, size=(size[0], size[1]))
+        usual = published_part(field)
+        return Grid.over(Bounds(*(low or usual[:2]), *(high or usual[2:])), self.spacing_m)
 
 
 @dataclass(kw_only=True)
@@ -79,7 +66,7 @@ class DatabaseRouteCommand(PathOptions):
 
     out: Path
     """Folder to write; one that was interrupted is completed."""
-    spacing_m: float = 0.015
+    spacing_m: float = ROUTE_SPACING
     """Distance between views."""
     json: bool = False
     """Print one JSON object instead of text."""

@@ -28,6 +28,9 @@ WORLD = (
     "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
 )
 
+ROUTE_SPACING = (
+    0.02  # m, between the route views of a database and of the studies: docs/report.md derives it from the thesis
+)
 FILE_SUFFIX = ".safetensors"  # of trained models
 
 

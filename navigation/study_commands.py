@@ -10,7 +10,7 @@ import tyro
 
 from world.errors import InputError
 
-from .options import PathOptions
+from .options import ROUTE_SPACING, PathOptions
 from .terminal import progress_of_parts, say
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class StudyOptions(PathOptions):
     """Take the grid's views from this image database (see tussock database) instead of drawing them; needs --route-database."""
     route_database: Path | None = None
     """Take the route's views from this one."""
-    spacing_m: float = 0.02
+    spacing_m: float = ROUTE_SPACING
     """Distance between route views."""
     seeds: int = 3
     """Repeat all that is random, generated worlds and routes included, for so many seeds from --seed on."""

@@ -34,6 +34,12 @@ from .database_files import (
 from .renderer import Poses, Renderer
 
 BATCH = 64  # views rendered while those before are encoded
+MOST_VIEWS = 10**6  # of a grid
+
+
+def published_part(field: Bounds) -> Bounds:
+    """The part of a field that the published grid covers: from 0 to 10 m in both axes."""
+    return Bounds(max(0.0, field.x_min), max(0.0, field.y_min), min(10.0, field.x_max), min(10.0, field.y_max))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,12 +54,16 @@ class Grid:
     size: tuple[int, int]
 
     @classmethod
-    def over(cls, field: Bounds, spacing: float) -> "Grid":
-        """The multiples of `spacing` from (0, 0) to (10, 10) m, as the published grid, that lie inside a field."""
-        low = np.ceil(np.maximum(0.0, [field.x_min, field.y_min]) / spacing - 1e-9).astype(int)
-        high = np.floor(np.minimum(10.0, [field.x_max, field.y_max]) / spacing + 1e-9).astype(int)
+    def over(cls, bounds: Bounds, spacing: float) -> "Grid":
+        """The multiples of `spacing` (m) inside bounds, borders included. Raises InputError where there are none, or over a million."""
+        # A billionth of a spacing beyond the borders: 0.6 / 0.2 is not quite 3.
+        low = np.ceil(np.array(bounds[:2]) / spacing - 1e-9).astype(int)
+        across, up = (np.floor(np.array(bounds[2:]) / spacing + 1e-9).astype(int) - low + 1).tolist()
+        if min(across, up) < 1 or across * up > MOST_VIEWS:
+            raise InputError(
+                f"a grid of {spacing:g} m over {bounds} has {max(0, across)} x {max(0, up)} places; give another spacing or part"
+            )
         x, y = (low * spacing).tolist()
-        across, up = (high - low + 1).tolist()
         return cls(begin=(x, y), spacing=spacing, size=(across, up))
 
     def poses(self) -> Float[np.ndarray, "n 3"]:

@@ -4,14 +4,13 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float, UInt8
 
 from render.database import read_database
 from render.database_files import as_kept
-from render.database_writing import Grid
+from render.database_writing import Grid, published_part
 from render.eye import Eye
 from render.renderer import open_renderer
 from world.errors import InputError
@@ -19,12 +18,11 @@ from world.geometry import Route
 from world.scene import World
 
 from ..evaluation import nearest_view
-from ..rotation import scan_window
+from ..options import ROUTE_SPACING
 
 BESIDE = 0.5  # m; grid places farther from the route are not looked at
 NEAR = 0.2  # m; headings are recovered at the grid places this near to the route (section 4.3.1 of the thesis)
 GRID = 0.2  # m, between grid places (4.1)
-SPACING = 0.02  # m, between route views: docs/report.md derives it from the thesis's own counts
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,7 +31,7 @@ class Material:
 
     route: poses of the route views, which face along it. route_views: (n, height, width, 3 or 4).
     places: (m, 3) poses of grid views within BESIDE of the route. place_views: alike.
-    grid: (k, 2) all places of the grid (m). world: what they were taken in, where it is at hand. source: said in the report.
+    grid: (k, 2) all places of the grid (m). world: what they were taken in, where it is at hand.
     """
 
     route: Route
@@ -42,7 +40,6 @@ class Material:
     place_views: UInt8[np.ndarray, "m height width channels"]
     grid: Float[np.ndarray, "k 2"]
     world: World | None
-    source: dict[str, Any]
 
     @cached_property
     def nearest(self) -> np.ndarray:
@@ -74,31 +71,23 @@ class Material:
             whole.update(np.ascontiguousarray(array).data)
         return whole.hexdigest()
 
-    def window(self, angle: float) -> Bool[np.ndarray, "m w"]:
-        """Which rotations of each place's view a scan of `angle` (rad) about the general direction looks at."""
-        width = self.place_views.shape[2]
-        return np.stack([scan_window(width, angle, self.general_direction - facing) for facing in self.places[:, 2]])
-
 
 def material_of_world(
-    world: World, route: Route, eye: Eye | None = None, *, backend: str = "auto", spacing: float = SPACING, grid: float = GRID,
-    source: dict[str, Any] | None = None,
+    world: World, route: Route, eye: Eye | None = None, *, backend: str = "auto", spacing: float = ROUTE_SPACING
 ) -> Material:  # fmt: skip
     """Draw the views along a route and at the grid beside it, at the poses that a database of them would hold."""
     views = Route(as_kept(route.resampled(spacing).poses))
-    every = as_kept(Grid.over(world.field, grid).poses())
+    every = as_kept(Grid.over(published_part(world.field), GRID).poses())
     places = every[views.nearest(every[:, :2])[0] <= BESIDE]
     check_places(places)
     with open_renderer(world, eye, backend) as renderer:
         return Material(
             route=views, route_views=renderer.render(views.poses), places=places, place_views=renderer.render(places),
-            grid=every[:, :2], world=world, source=source or {},
+            grid=every[:, :2], world=world,
         )  # fmt: skip
 
 
-def material_of_databases(
-    grid: Path, route: Path, *, world: World | None = None, source: dict[str, Any] | None = None
-) -> Material:
+def material_of_databases(grid: Path, route: Path, *, world: World | None = None) -> Material:
     """Read the views along a route and at the grid beside it from two image databases. Raises InputError for unusable ones."""
     grid_database, route_database = read_database(grid), read_database(route)
     for database, kind in ((grid_database, "grid"), (route_database, "route")):
@@ -119,7 +108,7 @@ def material_of_databases(
         raise InputError(f"{route} and {grid} hold views of different sizes ({sizes}); a study needs them alike")
     return Material(
         route=views, route_views=route_views, places=places, place_views=place_views, grid=grid_database.poses[:, :2],
-        world=world, source=source or {},
+        world=world,
     )  # fmt: skip
 
 

@@ -156,10 +156,11 @@ def _by_distance(around: pd.DataFrame) -> pd.DataFrame:
 def _examples(around: pd.DataFrame) -> dict[str, float]:
     """How many of the recovered headings are good, near and farther off."""
     good, near = around["error_deg"] < RECOVERED_DEG, around["distance_m"] <= AROUND / 2
+    failed = around[~good]
     return {
         "share_recovered_within_0.25_m": float(good[near].mean()),
         "share_recovered_beyond_0.25_m": float(good[~near].mean()),
-        "share_of_failures_with_several_minima": float((around["minima"][~good] > 1).mean()) if (~good).any() else 0.0,
+        "share_of_failures_with_several_minima": float((failed["minima"] > 1).mean()) if len(failed) else 0.0,
     }
 
 
