@@ -152,7 +152,12 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         for before, after in pairwise(self._sizes(inputs.shape[1])):
             bound = (factor / (before + after)) ** 0.5  # Glorot's
             draw = [(torch.rand(shape, generator=random) * 2 - 1) * bound for shape in ((after, before), (after,))]
-            layers.append(tuple(self._here(each).requires_grad_() for each in draw))
+            layers.append(tuple(self._here(each) for each in draw))
+        if self.solver != "adam" and inputs.shape[1] > len(inputs):
+            inputs, layers[0], restored = in_span(inputs, layers[0])
+        else:
+            restored = None
+        layers = [tuple(each.requires_grad_() for each in layer) for layer in layers]
 
         def loss(inputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
             fit = binary_cross_entropy_with_logits(forward(inputs, layers, self.activation), targets)
@@ -163,7 +168,8 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
             self._minimise(parameters, lambda: loss(inputs, targets))
         else:
             self._descend(parameters, loss, inputs, targets, random)
-        return [(weights.detach(), biases.detach()) for weights, biases in layers]
+        fitted = [(weights.detach(), biases.detach()) for weights, biases in layers]
+        return fitted if restored is None else [restored(*fitted[0]), *fitted[1:]]
 
     def _minimise(self, parameters: list[torch.Tensor], loss: Callable[[], torch.Tensor]) -> None:
         """L-BFGS on all data at once, as scikit-learn does it."""
@@ -187,7 +193,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         """Stochastic gradient descent with Nesterov momentum, or Adam, until the loss no longer falls."""
         rate = self.learning_rate_init
         optimiser = (
-            torch.optim.Adam(parameters, lr=rate)
+            torch.optim.Adam(parameters, lr=rate, fused=True)
             if self.solver == "adam"
             else torch.optim.SGD(parameters, lr=rate, momentum=0.9, nesterov=True)
         )
@@ -204,6 +210,27 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
             best = min(best, total)
             if passes_since > PATIENCE:
                 break
+
+
+def in_span(inputs: torch.Tensor, layer: tuple) -> tuple[torch.Tensor, tuple, Callable[..., tuple]]:
+    """Views and first layer in an orthonormal basis, for views (n, pixels) that have more pixels than there are views.
+
+    Gradients of the weights lie in the span of the views, all but that of the penalty, which shrinks what is orthogonal to it. So
+    n coordinates of a unit's weights, and the length of their orthogonal rest, are all that training by a method that rotations of
+    the weights do not change can alter: gradient descent and L-BFGS, not Adam. Returns views, layer and the way back of a layer.
+    """
+    weights, biases = layer
+    basis = torch.linalg.qr(inputs.T).Q  # (pixels, n)
+    inside = weights @ basis
+    rest = weights - inside @ basis.T
+    length = rest.norm(dim=1, keepdim=True)
+    rest = rest / length.clamp(min=torch.finfo(rest.dtype).tiny)
+
+    def restored(weights: torch.Tensor, biases: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        return weights[:, :-1] @ basis.T + weights[:, -1:] * rest, biases
+
+    reduced = torch.cat([inputs @ basis, torch.zeros(len(inputs), 1, device=inputs.device)], dim=1)
+    return reduced, (torch.cat([inside, length], dim=1), biases), restored
 
 
 def forward(inputs: torch.Tensor, layers: Layers, activation: str) -> torch.Tensor:
