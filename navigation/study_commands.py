@@ -40,12 +40,13 @@ class StudyOptions(PathOptions):
 
     def replicate(self, names: tuple[str, ...], title: str, only: str | None = None) -> dict[str, Any]:
         """Do studies for all seeds and write the report."""
-        from .studies.report import check_report_folder, verdicts, write_report
+        from .studies.report import check_report_folder, exhibits_of, verdicts, write_report
         from .studies.settings import Settings
         from .studies.thesis import run_studies
 
         self.check()
         about = self.about() | ({} if only is None else {"Figure": only})
+        exhibits_of(names, only)
         check_report_folder(self.out, about, overwrite=self.overwrite)
         runs, first = {}, None
         count = 1 if self.quick else self.seeds

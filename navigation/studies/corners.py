@@ -1,5 +1,6 @@
 """Study 6: corners (section 4.4.7, figures 29 to 32, appendix 7.6), and choosing views by how much they differ."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,8 @@ from .material import Material
 from .settings import Settings
 
 REACH = 0.3  # m; turning at a place is the change of direction from so far before to so far after
-SHARE = 0.2  # of the route: the part of it that turns the most is its corners
+SHARE = 0.2  # of the route at most: the part of it that turns the most is its corners ..
+LEAST = math.radians(10)  # .. where it turns this much
 MARGIN = 0.4  # m of straight route shown on both sides of the corners looked at
 RAW = Encoding.parse("grey")
 
@@ -34,9 +36,10 @@ def turning(route: Route) -> Float[np.ndarray, " n"]:
 
 
 def corner_views(route: Route) -> Int[np.ndarray, " k"]:
-    """Indices of the route views in corners: the share of them where the route turns the most."""
+    """Indices of the route views in corners: the share of them where the route turns the most, and by no less than LEAST."""
     turned = turning(route)
-    return np.sort(np.argsort(-turned, kind="stable")[: max(1, round(SHARE * len(turned)))])
+    most = np.argsort(-turned, kind="stable")[: max(1, round(SHARE * len(turned)))]
+    return np.sort(most[turned[most] >= min(LEAST, turned.max())])
 
 
 def corner_section(route: Route) -> tuple[int, int]:

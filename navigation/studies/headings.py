@@ -48,5 +48,5 @@ def box_of(errors: pd.Series) -> dict[str, float]:
     within = errors[(errors >= low - reach) & (errors <= high + reach)]
     return {
         "median_error_deg": middle, "mean_error_deg": errors.mean(), "lower_quartile_deg": low, "upper_quartile_deg": high,
-        "lower_whisker_deg": within.min(), "upper_whisker_deg": within.max(), "places": len(errors),
+        "lower_whisker_deg": min(low, within.min()), "upper_whisker_deg": max(high, within.max()), "places": len(errors),
     }  # fmt: skip

@@ -22,6 +22,7 @@ from ..options import ROUTE_SPACING
 
 BESIDE = 0.5  # m; grid places farther from the route are not looked at
 NEAR = 0.2  # m; headings are recovered at the grid places this near to the route (section 4.3.1 of the thesis)
+LEAST_VIEWS, LEAST_PLACES = 48, 8  # fewer say nothing
 GRID = 0.2  # m, between grid places (4.1)
 
 
@@ -79,7 +80,7 @@ def material_of_world(
     views = Route(as_kept(route.resampled(spacing).poses))
     every = as_kept(Grid.over(published_part(world.field), GRID).poses())
     places = every[views.nearest(every[:, :2])[0] <= BESIDE]
-    check_places(places)
+    check_enough(views, places)
     with open_renderer(world, eye, backend) as renderer:
         return Material(
             route=views, route_views=renderer.render(views.poses), places=places, place_views=renderer.render(places),
@@ -101,7 +102,7 @@ def material_of_databases(grid: Path, route: Path, *, world: World | None = None
         raise InputError(f"{route}: two views in a row stand at one place; a study needs them apart")
     rows = np.flatnonzero(views.nearest(grid_database.poses[:, :2])[0] <= BESIDE)
     places = grid_database.poses[rows]
-    check_places(places)
+    check_enough(views, places)
     route_views, place_views = route_database.views(), grid_database.views(rows.tolist())
     if route_views.shape[1:] != place_views.shape[1:]:
         sizes = " and ".join(f"{views.shape[2]} x {views.shape[1]}" for views in (route_views, place_views))
@@ -112,7 +113,13 @@ def material_of_databases(grid: Path, route: Path, *, world: World | None = None
     )  # fmt: skip
 
 
-def check_places(places: Float[np.ndarray, "m 3"]) -> None:
-    """Refuse a grid that says nothing about the route. Raises InputError."""
-    if len(places) < 8:
-        raise InputError(f"{len(places)} grid places lie within {BESIDE:g} m of the route; a study needs at least 8")
+def check_enough(route: Route, places: Float[np.ndarray, "m 3"]) -> None:
+    """Refuse a route or a grid beside it that says too little. Raises InputError."""
+    if len(route.poses) < LEAST_VIEWS:
+        raise InputError(
+            f"{len(route.poses)} route views; a study needs at least {LEAST_VIEWS}: give a longer route or a smaller spacing"
+        )
+    if len(places) < LEAST_PLACES:
+        raise InputError(
+            f"{len(places)} grid places lie within {BESIDE:g} m of the route; a study needs at least {LEAST_PLACES}"
+        )

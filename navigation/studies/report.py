@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+from collections.abc import Collection
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -96,10 +97,7 @@ def write_report(
     and {figure} in it. only: number of the one figure or table to make. Returns results.json's content.
     """
     first, *_ = runs.values()
-    exhibits = [each for each in (*PICTURES, *LISTINGS) if each.study in first and only in (None, *_numbers(each))]
-    if not exhibits:
-        known = ", ".join(each.number for each in (*PICTURES, *LISTINGS) if each.study in first)
-        raise InputError(f"there is no figure {only!r} in this study; it has {known}")
+    exhibits = exhibits_of(first, only)
     (out / FIGURES).mkdir(parents=True, exist_ok=True)
     judged = verdicts(runs)
     results = _results(runs, judged, about)
@@ -114,6 +112,16 @@ def write_report(
     with replacing(out / REPORT) as partial:  # last: a folder with a report holds everything
         partial.write_text(page, encoding="utf-8")
     return results
+
+
+def exhibits_of(studies: Collection[str], only: str | None = None) -> list[Picture | Listing]:
+    """The figures and tables of studies, or the one that is called `only`. Raises InputError where there is none."""
+    every = [each for each in (*PICTURES, *LISTINGS) if each.study in studies]
+    chosen = [each for each in every if only in (None, *_numbers(each))]
+    if not chosen:
+        known = ", ".join(number for each in every for number in each.number.split(", "))
+        raise InputError(f"there is no figure {only!r} in this study; it has {known}")
+    return chosen
 
 
 def _numbers(exhibit: Picture | Listing) -> list[str]:

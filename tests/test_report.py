@@ -1,0 +1,183 @@
+"""The replication from the command line: its report in a real browser, its numbers, and what interruptions leave."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from navigation.cli import main
+from navigation.studies.figures import PICTURES
+from navigation.studies.tables import LISTINGS
+from navigation.studies.thesis import STUDIES
+
+TINY = ("--quick", "--world", "tiny", "--size", "72x15", "--spacing-m", "0.04")
+CLAIMS = {
+    "idf-minimum", "visual-compass-near", "error-grows-with-distance", "mean-biased-by-outliers", "error-grows-with-frequency",
+    "flat-then-rises-with-resize", "smoothing-helps", "middle-resolution-best", "classifier-accurate", "few-views-work",
+    "whole-route-fails", "perfect-memory-beside", "lbfgs-for-few", "adam-for-the-route", "corners-change-faster", "worse-in-corners",
+    "more-corner-views-help", "longer-training-helps", "longer-training-broadens", "failures-point-backwards", "narrower-scans-help",
+    "full-scan-solved",
+}  # fmt: skip
+
+
+def tussock(*words) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "navigation.cli", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def replication(tmp_path_factory) -> Path:
+    """A whole replication, interrupted once."""
+    out = tmp_path_factory.mktemp("thesis") / "report"
+    command = [sys.executable, "-m", "navigation.cli", "replicate", "thesis", *TINY, "--out", str(out), "--json"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("resolution: done"):
+                break
+        time.sleep(1)  # into the next study
+        process.send_signal(signal.SIGTERM)
+        process.communicate()
+        assert process.returncode == 143
+    assert not (out / "report.html").exists()
+    done = tussock("replicate", "thesis", *TINY, "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("kept from before") == 4
+    assert done.stderr.count("done in") == 4
+    assert set(json.loads(done.stdout)["claims"]) == CLAIMS
+    return out
+
+
+def test_results_hold_published_and_obtained_numbers(replication):
+    text = (replication / "results.json").read_text()
+    results = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
+    assert set(results["claims"]) == CLAIMS
+    studies = results["seeds"]["0"]
+    assert list(studies) == list(STUDIES)
+    for study in studies.values():
+        assert study.keys() == {"published", "obtained", "holds", "tables"}
+    assert studies["resolution"]["published"]["sampled"]["median_error_deg"][9] == 25.247
+    assert studies["confidence"]["published"]["narrower-scans-help"]["180 degrees, in the conclusion (deg)"] == 17
+    for key, claim in results["claims"].items():
+        assert claim["obtained"], key
+        assert all(
+            spread["lowest"] is None or spread["lowest"] <= spread["median"] <= spread["highest"]
+            for spread in claim["obtained"].values()
+        )
+        assert len(claim["holds"]) == 1
+
+
+def test_the_page_is_self_contained_and_has_everything(replication):
+    page = (replication / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
+    assert page.index('id="summary"') < page.index('id="setting"')
+    anchors = set(re.findall(r'id="([^"]+)"', page))
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= anchors
+    for exhibit in (*PICTURES, *LISTINGS):
+        assert f": {exhibit.title}</h3>".replace("'", "&#39;") in page
+    assert {f"claim-{key}" for key in CLAIMS} <= anchors
+    assert page.count("data:image/png;base64,") == len(PICTURES)
+    figures = sorted(path.name for path in (replication / "figures").iterdir())
+    assert len(figures) == 2 * len(PICTURES)
+    assert sum(name.endswith(".svg") for name in figures) == len(PICTURES)
+
+
+PROBE = """<script>addEventListener("load", () => {
+  const wide = [...document.querySelectorAll("body *")].filter(e => e.getBoundingClientRect().right > innerWidth + 1
+    && !e.closest(".wide, pre")).map(e => e.tagName + "." + e.className);
+  const broken = [...document.images].filter(i => !i.complete || i.naturalWidth == 0).length;
+  const small = [...document.querySelectorAll("p, td, th, figcaption, pre")]
+    .filter(e => parseFloat(getComputedStyle(e).fontSize) < 11).length;
+  document.title = "PROBE" + JSON.stringify({width: innerWidth, wide, broken, small, images: document.images.length});
+});</script>"""
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+def test_a_browser_shows_it_without_errors(replication, tmp_path, width):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None and not os.environ.get("TUSSOCK_REQUIRE_GL"):
+        pytest.skip("chromium is not installed (Debian: chromium)")
+    assert browser is not None
+    page = tmp_path / "probed.html"
+    page.write_text((replication / "report.html").read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"))
+    frame = tmp_path / "frame.html"  # a frame is as narrow as it is told to be; a window is not
+    frame.write_text(f"""<iframe src="probed.html" style="width:{width}px;height:800px;border:0"></iframe>
+<script>const copy = () => {{ document.title = document.querySelector("iframe").contentDocument.title; }};
+addEventListener("load", () => setInterval(copy, 50));</script>""")
+    done = subprocess.run(
+        [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+         "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}", "--enable-logging=stderr",
+         "--allow-file-access-from-files", "--window-size=1600,900", "--virtual-time-budget=8000", "--dump-dom", f"file://{frame}"],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    found = re.search(r"<title>PROBE(.*?)</title>", done.stdout)
+    assert found, done.stderr[-2000:]
+    probe = json.loads(found.group(1).replace("&quot;", '"').replace("&amp;", "&"))
+    assert "CONSOLE" not in done.stderr
+    assert probe == {"width": width, "wide": [], "broken": 0, "small": 0, "images": len(PICTURES)}
+
+
+def test_a_second_run_finds_everything_done_and_changes_no_number(replication):
+    before = {path.name: path.read_bytes() for path in (replication / "results.json", replication / "report.html")}
+    done = tussock("replicate", "thesis", *TINY, "--out", replication)
+    assert done.returncode == 0
+    assert done.stderr.count("kept from before") == len(STUDIES)
+    assert {name: (replication / name).read_bytes() for name in before} == before
+
+
+def test_a_report_of_something_else_is_not_replaced(replication, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["replicate", "thesis", *TINY, "--seed", "3", "--out", str(replication)])
+    assert end.value.code == 2
+    assert "holds a report of something else (Seeds)" in capsys.readouterr().err
+
+
+def test_one_figure_alone(replication, tmp_path):
+    page = (replication / "report.html").read_text(encoding="utf-8")
+    assert (
+        "tussock study frequency --figure &#39;14&#39; --world tiny --size 72x15 --spacing-m 0.04 --quick --out figure"
+        in page
+    )
+    done = tussock("study", "frequency", "--figure", "14", *TINY, "--out", tmp_path / "one", "--json")
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in sorted((tmp_path / "one" / "figures").iterdir())] == [
+        "figure-14.png",
+        "figure-14.svg",
+    ]
+    alone, whole = (
+        json.loads((folder / "results.json").read_text())["seeds"]["0"]["frequency"]
+        for folder in (tmp_path / "one", replication)
+    )
+    for each in (alone, whole):
+        del each["obtained"]["seconds"]
+    assert alone == whole
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["study", "nonsense"], "unknown study 'nonsense'; give one of setting"),
+        (["study", "setting", "--figure", "99", *TINY], "no figure '99' in this study; it has 4, 5"),
+        (["study", "setting", "--grid-database", "g"], "go together"),
+        (["study", "setting", "--seeds", "0"], "give at least 1"),
+        (["study", "setting", "--grid-database", "g", "--route-database", "r"], "g"),
+        (["study", "setting", "--spacing-m", "-1", *TINY[:5]], "spacing -1 m does not fit"),
+        (["study", "setting", "--spacing-m", "1", *TINY[:5]], "route views"),
+        (["replicate", "thesis", "--out", __file__], "is a file"),
+    ],
+)
+def test_bad_input_is_one_line(words, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    assert end.value.code == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message in said
+    assert not (tmp_path / "study" / "report.html").exists()
