@@ -27,10 +27,11 @@ class StudyOptions(PathOptions):
     """Take the route's views from this one."""
     spacing_m: float = ROUTE_SPACING
     """Distance between route views."""
-    seeds: int = 3
-    """Repeat all that is random, generated worlds and routes included, for so many seeds from --seed on."""
+    seeds: int | None = None
+    """Repeat for so many seeds from --seed on. Default: 3 where world or route are generated, so 3 of them; else 1, as each network is
+    started from three seeds anyway."""
     quick: bool = False
-    """A first look: one seed, one start of each network, shorter training, small grid searches, fewer pixels."""
+    """A first look: one seed and one start of each network, shorter training, small grid searches, fewer pixels."""
     out: Path = Path("replication")
     """Folder for the report; studies that were finished there are not done again."""
     overwrite: bool = False
@@ -49,14 +50,13 @@ class StudyOptions(PathOptions):
         exhibits_of(names, only)
         check_report_folder(self.out, about, overwrite=self.overwrite)
         runs, first = {}, None
-        count = 1 if self.quick else self.seeds
         material = None
-        for seed in range(self.seed, self.seed + count):
+        for seed in self.all_seeds():
             if material is None or self.grows():
                 material = self.material(seed)
             first = first or material
             settings = Settings(seed=seed, quick=self.quick)
-            say(f"seed {seed}" + f" ({seed - self.seed + 1} of {count})" * (count > 1))
+            say(f"seed {seed} of {self.all_seeds()[0]} to {self.all_seeds()[-1]}")
             with progress_of_parts() as report:
                 runs[seed] = run_studies(material, settings, self.out / "findings", names, report)
         assert first is not None
@@ -73,7 +73,7 @@ class StudyOptions(PathOptions):
         """Refuse flags that do not go together. Raises InputError."""
         if (self.grid_database is None) != (self.route_database is None):
             raise InputError("--grid-database and --route-database go together; give both, or neither")
-        if self.seeds < 1:
+        if self.seeds is not None and self.seeds < 1:
             raise InputError(f"--seeds {self.seeds}: give at least 1")
 
     def grows(self) -> bool:
@@ -81,6 +81,11 @@ class StudyOptions(PathOptions):
         from world.params import PRESETS
 
         return self.grid_database is None and (self.world in PRESETS or self.route is None)
+
+    def all_seeds(self) -> range:
+        """The seeds to repeat for."""
+        count = self.seeds or (3 if self.grows() and not self.quick else 1)
+        return range(self.seed, self.seed + count)
 
     def material(self, seed: int) -> "Material":
         """The views to study."""
@@ -108,8 +113,8 @@ class StudyOptions(PathOptions):
                 "World": world, "Route": "generated" if self.route is None else str(self.route),
                 "Views": f"{width} x {height} pixels, one every {100 * self.spacing_m:g} cm of the route",
             }  # fmt: skip
-        last = self.seed + (1 if self.quick else self.seeds) - 1
-        seeds = str(self.seed) if last == self.seed else f"{self.seed} to {last}; figures and tables are of the first"
+        first, last = self.all_seeds()[0], self.all_seeds()[-1]
+        seeds = str(first) if last == first else f"{first} to {last}; figures and tables are of the first"
         return seen | {"Seeds": seeds} | ({"Depth": "a first look (--quick)"} if self.quick else {})
 
     def command(self) -> str:

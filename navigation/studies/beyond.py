@@ -36,18 +36,22 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
     runs = _runs(settings)
     for done, (problem, name, make, encoding, choice) in enumerate(runs):
         views, places = images[encoding]
-        found = [headings(material, make(seed).fit(views[choices[choice]]), places) for seed in settings.seeds]
-        errors = pd.DataFrame([errors_of(table) for table in found]).median()
-        parts = {
-            part: float(np.median([table.loc[where, "error_deg"].median() for table in found]))
-            for part, where in (("corners", in_corner), ("straights", ~in_corner))
-        }
+        table = headings(material, make(settings.seeds[0]).fit(views[choices[choice]]), places)
         rows.append(
-            {"problem": problem, "model": name, "encoding": encoding, "views": choice, "number_of_views": len(choices[choice])}
-            | {key: float(errors[key]) for key in ("median_error_deg", "mean_error_deg", "share_over_45")}
-            | {f"median_error_deg_{part}": value for part, value in parts.items()}
-        )  # fmt: skip
-        tables[f"headings, {name}, {encoding}, {choice}"] = found[0]
+            {
+                "problem": problem,
+                "model": name,
+                "encoding": encoding,
+                "views": choice,
+                "number_of_views": len(choices[choice]),
+            }
+            | errors_of(table)
+            | {
+                f"median_error_deg_{part}": float(table.loc[where, "error_deg"].median())
+                for part, where in (("corners", in_corner), ("straights", ~in_corner))
+            }
+        )
+        tables[f"headings, {name}, {encoding}, {choice}"] = table
         progress(done + 1, len(runs))
     by_model = pd.DataFrame(rows)
     return Findings(tables={"by_model": by_model} | tables, numbers={}, claims=_claims(by_model))

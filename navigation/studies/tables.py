@@ -143,7 +143,7 @@ LISTINGS = [
         number="beyond numbers",
         study="beyond",
         title="Models, features and choices of views",
-        caption="Errors over the full circle; medians over random starts.",
+        caption="Errors over the full circle, of one random start each.",
         rows=_whole("by_model"),
     ),
 ]
