@@ -11,6 +11,7 @@ from jaxtyping import Float, Float32, Float64
 from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.base import BaseEstimator, ClassifierMixin
+from threadpoolctl import threadpool_limits
 from torch.nn.functional import binary_cross_entropy_with_logits, linear
 
 from world.errors import InputError
@@ -25,6 +26,7 @@ ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
     "tanh": torch.tanh,
     "relu": torch.relu,
 }
+SMALL = 4 * 10**6  # multiplications in a pass over the views
 PATIENCE = 10  # passes without progress after which sgd and adam stop
 
 Layers = list[tuple[torch.Tensor, torch.Tensor]]  # weights (outputs, inputs) and biases (outputs,)
@@ -164,10 +166,13 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
             return fit + 0.5 * self.alpha / len(inputs) * sum(weights.square().sum() for weights, _ in layers)
 
         parameters = [each for layer in layers for each in layer]
-        if self.solver == "lbfgs":
-            self._minimise(parameters, lambda: loss(inputs, targets))
-        else:
-            self._descend(parameters, loss, inputs, targets, random)
+        products = len(inputs) * sum(weights.numel() for weights, _ in layers)
+        # Small ones are quickest on one thread, and far quicker where other programs keep the cores busy.
+        with threadpool_limits(1 if products < SMALL else None):
+            if self.solver == "lbfgs":
+                self._minimise(parameters, lambda: loss(inputs, targets))
+            else:
+                self._descend(parameters, loss, inputs, targets, random)
         fitted = [(weights.detach(), biases.detach()) for weights, biases in layers]
         return fitted if restored is None else [restored(*fitted[0]), *fitted[1:]]
 

@@ -69,7 +69,8 @@ def _runs(settings: Settings) -> list[Run]:
     def model(name: str, **parameters) -> Callable[[int], Model]:
         return lambda seed: make_model(name, seed=seed, **parameters)
 
-    rotation, network = model("mlp-rotation"), "mlp-rotation"
+    steps = {"steps": 200} if settings.quick else {}
+    rotation, network = model("mlp-rotation", **steps), "mlp-rotation"
     return [
         ("the thesis", "mlp", thesis, "grey", "every 6th"),
         ("full scans", network, rotation, "grey", "every 6th"),
@@ -77,7 +78,7 @@ def _runs(settings: Settings) -> list[Run]:
         ("feature selection", "adaboost", model("adaboost"), "grey", "every 6th"),
         ("feature selection", network, rotation, "edges", "every 6th"),
         ("corners", network, rotation, "edges", "equally different"),
-        ("several networks", "mlp-mixture", model("mlp-mixture"), "edges", "every 6th"),
+        ("several networks", "mlp-mixture", model("mlp-mixture", **steps), "edges", "every 6th"),
         ("all together", network, rotation, "edges", "every 2nd"),
         ("all together", "perfect-memory", model("perfect-memory"), "edges", "every 2nd"),
     ]

@@ -1,5 +1,6 @@
 """What the figures are made of: the world from above, arrows for headings, curves over the circle, error plots."""
 
+import dataclasses
 from collections.abc import Mapping
 from functools import lru_cache
 
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from world.geometry import Route
+from world.geometry import Bounds, Route
 from world.scene import World
 
 from ..plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, draw_world
@@ -20,6 +21,7 @@ GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
 ARROW = 0.16  # m
 WIDE, TALL = (7.2, 2.9), (7.2, 5.6)  # inches
 MOST_WIDE, MOST_HIGH, MARGIN = 7.2, 7.0, 0.35  # of plans: inches, inches, m
+PLAN_PIXELS = 900  # of a plan's longer side
 
 
 def canvas(size: tuple[float, float] = WIDE, rows: int = 1, columns: int = 1, **options) -> tuple[Figure, np.ndarray]:
@@ -38,32 +40,32 @@ def plans(xy: np.ndarray, columns: int = 1) -> tuple[Figure, np.ndarray]:
     return canvas((scale * across * columns + 0.7 + 0.15 * columns, scale * up + 0.9), 1, columns, sharey=True)
 
 
-@lru_cache(maxsize=1)
-def from_above(world: World) -> tuple[UInt8[np.ndarray, "h w 4"], tuple[float, float, float, float]]:
-    """The world from above as an image, and where its edges are (left, right, bottom, top; m)."""
-    figure = Figure(figsize=(16, 16))
+@lru_cache(maxsize=16)
+def from_above(world: World, part: Bounds) -> UInt8[np.ndarray, "h w 4"]:
+    """Part of a world from above as an image."""
+    low, high = world.triangles[..., :2].min(axis=1), world.triangles[..., :2].max(axis=1)
+    within = (low <= part[2:]).all(axis=1) & (high >= part[:2]).all(axis=1)
+    seen = dataclasses.replace(world, triangles=world.triangles[within], rgb=world.rgb[within], textured=())
+    across, up = part.x_max - part.x_min, part.y_max - part.y_min
+    figure = Figure(figsize=(across / max(across, up), up / max(across, up)), dpi=PLAN_PIXELS)
     drawn = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
-    draw_world(axes, world)
-    axes.set_aspect("auto")
+    draw_world(axes, seen)
+    axes.set(xlim=(part.x_min, part.x_max), ylim=(part.y_min, part.y_max), aspect="auto")
     axes.axis("off")
     drawn.draw()
-    return np.asarray(drawn.buffer_rgba()).copy(), (*axes.get_xlim(), *axes.get_ylim())
+    return np.asarray(drawn.buffer_rgba()).copy()
 
 
-def plan(axes: Axes, world: World | None, *, faint: bool = True) -> None:
-    """Axes to scale (m), with the world from above where it is at hand."""
-    if world is not None:
-        image, edges = from_above(world)
-        axes.imshow(image, extent=edges, alpha=0.35 if faint else 1.0, interpolation="bilinear", zorder=0)
-    axes.set(xlabel="x, east (m)", ylabel="y, north (m)")
-    axes.set_aspect("equal", adjustable="box")
-
-
-def look_at(axes: Axes, xy: np.ndarray, margin: float = MARGIN) -> None:
-    """Show the part of a plan that holds points."""
+def plan(axes: Axes, world: World | None, xy: np.ndarray, margin: float = MARGIN, *, faint: bool = True) -> None:
+    """Make axes a plan (m, to scale) of the part that holds the points xy; the world lies under it where it is at hand."""
     low, high = xy.min(axis=0) - margin, xy.max(axis=0) + margin
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    part = Bounds(*np.round([*low, *high], 6).tolist())
+    if world is not None:
+        edges = (part.x_min, part.x_max, part.y_min, part.y_max)
+        axes.imshow(from_above(world, part), extent=edges, alpha=0.35 if faint else 1.0, zorder=0)
+    axes.set(xlim=(part.x_min, part.x_max), ylim=(part.y_min, part.y_max), xlabel="x, east (m)", ylabel="y, north (m)")
+    axes.set_aspect("equal", adjustable="box")
 
 
 def draw_route(axes: Axes, route: Route, **style) -> None:
@@ -82,15 +84,20 @@ def arrows(axes: Axes, x, y, heading_deg, colour, length=ARROW, **style) -> None
     )  # fmt: skip
 
 
-def heading_diagram(axes: Axes, table: pd.DataFrame, route: Route, world: World | None, title: str = "") -> None:
-    """Recovered headings at grid places: green where they are less than 45 degrees off, red where not; the route in blue."""
-    plan(axes, world)
+def heading_diagram(
+    axes: Axes, table: pd.DataFrame, route: Route, world: World | None, title: str = "", *, whole: bool = True
+) -> None:
+    """Recovered headings at grid places: green where they are less than 45 degrees off, red where not; the route in blue.
+
+    whole: show all of the route, not only where the places are.
+    """
     draw_route(axes, route)
     every = np.linspace(0, len(route.poses) - 1, max(4, int(route.length / 0.4))).astype(int)[:-1]
     arrows(axes, *route.xy[every].T, np.degrees(route.poses[every, 2]), ROUTE_COLOUR, 0.12)
     good = table["error_deg"] < RECOVERED_DEG
     arrows(axes, table["x_m"], table["y_m"], table["heading_deg"], np.where(good, GOOD_COLOUR, PATH_COLOUR))
-    look_at(axes, np.vstack([route.xy, table[["x_m", "y_m"]].to_numpy()]))
+    places = table[["x_m", "y_m"]].to_numpy()
+    plan(axes, world, np.vstack([route.xy, places]) if whole else places)
     count = f"{int(good.sum())} of {len(good)} less than 45° off"
     axes.set_title(f"{title}\n{count}" if title else count, fontsize=9)
 

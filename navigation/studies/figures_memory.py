@@ -13,7 +13,6 @@ from .drawing import (
     diagrams,
     draw_route,
     lines,
-    look_at,
     panorama,
     plan,
     plans,
@@ -41,13 +40,12 @@ def _perfect_memory(found: Findings, material: Material, settings: Settings) -> 
 def _place_recognition(found: Findings, material: Material, settings: Settings) -> Figure:
     figure, axes = plans(material.route.xy)
     axis, table = axes[0, 0], found.tables["headings"]
-    plan(axis, material.world)
     draw_route(axis, material.route)
     nearest = material.route.xy[table["nearest_view"]]
     xy = table[["x_m", "y_m"]].to_numpy()
     axis.plot(*np.stack([xy, nearest], axis=1).T, color=SOFT_COLOUR, lw=0.9, zorder=1)
     axis.plot(*xy.T, "o", ms=3, color=CURVE_COLOUR)
-    look_at(axis, np.vstack([xy, nearest]))
+    plan(axis, material.world, np.vstack([xy, nearest]))
     return figure
 
 

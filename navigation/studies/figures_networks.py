@@ -12,7 +12,6 @@ from .drawing import (
     diagrams,
     draw_route,
     heading_diagram,
-    look_at,
     plan,
     plans,
 )
@@ -28,13 +27,12 @@ from .settings import Settings
 )  # fmt: skip
 def _learned(found: Findings, material: Material, settings: Settings) -> Figure:
     figure, axes = plans(material.route.xy)
-    plan(axes[0, 0], material.world)
     for use, colour in (("not used", SOFT_COLOUR), ("learned", ROUTE_COLOUR), ("held out", PATH_COLOUR)):
         rows = found.tables["training"]
         rows = rows[rows["use"] == use]
         axes[0, 0].plot(rows["x_m"], rows["y_m"], "o", ms=1.5 if use == "not used" else 3.5, color=colour, label=use)
     axes[0, 0].legend(fontsize=8)
-    look_at(axes[0, 0], material.route.xy)
+    plan(axes[0, 0], material.world, material.route.xy)
     return figure
 
 
@@ -46,11 +44,10 @@ def _positives(found: Findings, material: Material, settings: Settings) -> Figur
     rows = found.tables["training"]
     rows = rows[rows["use"] == "learned"].head(20)
     figure, axes = plans(rows[["x_m", "y_m"]].to_numpy())
-    plan(axes[0, 0], material.world)
     side = np.where(np.arange(len(rows)) % 2 == 0, -60, 60)
     arrows(axes[0, 0], rows["x_m"], rows["y_m"], rows["heading_deg"], ROUTE_COLOUR)
     arrows(axes[0, 0], rows["x_m"], rows["y_m"], rows["heading_deg"] + side, PATH_COLOUR)
-    look_at(axes[0, 0], rows[["x_m", "y_m"]].to_numpy())
+    plan(axes[0, 0], material.world, rows[["x_m", "y_m"]].to_numpy())
     return figure
 
 
@@ -68,9 +65,7 @@ def _one_place(found: Findings, material: Material, settings: Settings) -> Figur
     nearest = material.route.poses[int(row["nearest_view"])]
     arrows(axes[0, 1], [nearest[0]], [nearest[1]], [np.degrees(nearest[2])], ROUTE_COLOUR)
     arrows(axes[0, 1], [row["x_m"]], [row["y_m"]], [row["heading_deg"]], PATH_COLOUR)
-    axes[0, 1].set_aspect("equal")
-    look_at(axes[0, 1], np.array([nearest[:2], (row["x_m"], row["y_m"])]), 0.25)
-    axes[0, 1].set(xlabel="x (m)", ylabel="y (m)")
+    plan(axes[0, 1], material.world, np.array([nearest[:2], (row["x_m"], row["y_m"])]), 0.25)
     return figure
 
 
@@ -109,11 +104,10 @@ def _section(found: Findings, material: Material, settings: Settings) -> Figure:
     first, last = found.numbers["section_first_view"], found.numbers["section_last_view"]
     corners = found.tables["selections"]
     corners = corners[corners["in_corner"]]
-    plan(axes[0, 0], material.world)
     draw_route(axes[0, 0], material.route)
     axes[0, 0].plot(*material.route.xy[first : last + 1].T, color=CURVE_COLOUR, lw=4, alpha=0.5)
     axes[0, 0].plot(corners["x_m"], corners["y_m"], ".", color=PATH_COLOUR, ms=4, zorder=3)
-    look_at(axes[0, 0], material.route.xy)
+    plan(axes[0, 0], material.world, material.route.xy)
     return figure
 
 
@@ -145,11 +139,10 @@ def _change(found: Findings, material: Material, settings: Settings) -> Figure:
 def _more_views(found: Findings, material: Material, settings: Settings) -> Figure:
     figure, axes = plans(material.route.xy)
     table = found.tables["selections"]
-    plan(axes[0, 0], material.world)
     plain, doubled = (name for name in table.columns[3:5])
     for rows, colour in ((table[table[doubled] & ~table[plain]], PATH_COLOUR), (table[table[plain]], ROUTE_COLOUR)):
         axes[0, 0].plot(rows["x_m"], rows["y_m"], "o", ms=3.5, color=colour)
-    look_at(axes[0, 0], material.route.xy)
+    plan(axes[0, 0], material.world, material.route.xy)
     return figure
 
 
@@ -164,6 +157,5 @@ def _before_and_after(found: Findings, material: Material, settings: Settings) -
     for axis, name in zip(axes[0], chosen, strict=True):
         table = found.tables[f"headings, {name}"]
         table = table[table["in_section"]]
-        heading_diagram(axis, table, material.route, material.world, name)
-        look_at(axis, table[["x_m", "y_m"]].to_numpy())
+        heading_diagram(axis, table, material.route, material.world, name, whole=False)
     return figure

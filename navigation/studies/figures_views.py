@@ -12,7 +12,6 @@ from .drawing import (
     arrows,
     canvas,
     draw_route,
-    look_at,
     nothing,
     panorama,
     plan,
@@ -32,10 +31,9 @@ from .settings import Settings
 )  # fmt: skip
 def _world(found: Findings, material: Material, settings: Settings) -> Figure:
     figure, axes = plans(material.grid)
-    plan(axes[0, 0], material.world, faint=False)
     axes[0, 0].plot(*material.grid.T, ".", color=PATH_COLOUR, ms=1.6, alpha=0.7)
     draw_route(axes[0, 0], material.route)
-    look_at(axes[0, 0], np.vstack([material.grid, material.route.xy]), 0.2)
+    plan(axes[0, 0], material.world, np.vstack([material.grid, material.route.xy]), 0.2, faint=False)
     return figure
 
 
@@ -73,13 +71,12 @@ def _headings_around(found: Findings, material: Material, settings: Settings) ->
     table = around[around["reference"] == found.numbers["reference_shown"]]
     figure, axes = plans(table[["x_m", "y_m"]].to_numpy())
     axis = axes[0, 0]
-    plan(axis, material.world)
     length = 0.05 + 0.2 * (table["rms"].max() - table["rms"]) / max(1e-9, np.ptp(table["rms"]))
     colours = np.where(table["error_deg"] < RECOVERED_DEG, GOOD_COLOUR, PATH_COLOUR)
     arrows(axis, table["x_m"], table["y_m"], table["heading_deg"], colours, length)
     first = table.iloc[0]
     arrows(axis, [first["reference_x_m"]], [first["reference_y_m"]], [first["set_heading_deg"]], ROUTE_COLOUR, 0.25)
-    look_at(axis, table[["x_m", "y_m"]].to_numpy())
+    plan(axis, material.world, table[["x_m", "y_m"]].to_numpy())
     return figure
 
 
