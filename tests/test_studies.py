@@ -254,8 +254,13 @@ def test_databases_that_do_not_fit_a_study_are_refused(material, tmp_path):
         write_database(tmp_path / "grid", renderer, Grid.over(published_part(WORLD.field), 0.2))
         write_database(tmp_path / "route", renderer, ROUTE.resampled(0.1).poses)
     with open_renderer(WORLD, Eye(width=36, height=15, samples=1)) as renderer:
-        write_database(tmp_path / "small", renderer, ROUTE.resampled(0.1).poses)
-    for grid, route, why in (("route", "route", "give one of a grid"), ("grid", "small", "different sizes")):
+        write_database(tmp_path / "small", renderer, ROUTE.resampled(0.02).poses)
+    cases = (
+        ("route", "route", "give one of a grid"),
+        ("grid", "small", "different sizes"),
+        ("grid", "route", "20 route views; a study needs at least 48"),
+    )
+    for grid, route, why in cases:
         with pytest.raises(InputError, match=why):
             material_of_databases(tmp_path / grid, tmp_path / route)
 
