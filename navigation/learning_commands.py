@@ -167,7 +167,7 @@ class ModelsCommand:
 
     def run(self) -> dict[str, Any]:
         from .models import MODELS, OPPONENT, model_class
-        from .models.opponent import Opponent
+        from .models.opponents import Opponent
 
         classes = {name: model_class(name) for name in MODELS} | {f"{OPPONENT}...": Opponent}
         return {"models": {name: {"what": summary(cls), "paper": cls.paper} for name, cls in classes.items()}}

@@ -380,10 +380,11 @@ def test_ctrl_c_while_learning_leaves_the_earlier_run(capfd, tmp_path):
 @pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_walk_leaves_its_recording_and_trajectory(tmp_path, end, code):
     with start(*LONG, "--step-m", "0.001", "--out", "run", cwd=tmp_path) as process:
-        while not (tmp_path / "run" / "recording.rrd").exists():
+        recording, sizes = tmp_path / "run" / "recording.rrd", set()
+        while len(sizes) < 6:  # it has grown by step after step
             assert process.poll() is None
             time.sleep(0.05)
-        time.sleep(1)
+            sizes |= {recording.stat().st_size} if recording.exists() else set()
         process.send_signal(end)
         process.communicate()
     assert process.returncode == code

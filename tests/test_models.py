@@ -369,3 +369,11 @@ def test_rotation_networks_train_for_any_number_of_steps(steps):
 def test_unknown_models_are_refused_with_the_known_ones(name):
     with pytest.raises(InputError, match=r"known: .*perfect-memory.*mushroom-body"):
         make_model(name)
+
+
+def test_opponent_is_the_function_however_often_it_is_asked_for():
+    import navigation
+
+    make_model("opponent-perfect-memory")
+    assert callable(navigation.opponent)
+    assert callable(navigation.opponent)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .mlp_mixture import MLPMixture
     from .mlp_rotation import MLPRotation
     from .mushroom_body import MushroomBody
-    from .opponent import opponent
+    from .opponents import opponent
     from .perfect_memory import PerfectMemory
     from .rbm import RBM
     from .visual_compass import VisualCompass
@@ -53,7 +53,7 @@ MODELS = {
     "mushroom-body": "MushroomBody",
 }
 OPPONENT = "opponent-"  # before a model's name: the model twice, opposed
-_HOME = {cls: name.replace("-", "_") for name, cls in MODELS.items()} | {"opponent": "opponent"}
+_HOME = {cls: name.replace("-", "_") for name, cls in MODELS.items()} | {"opponent": "opponents"}
 
 
 def __getattr__(name: str):
@@ -72,7 +72,7 @@ def model_class(name: str) -> type[Model]:
 def make_model(name: str, **parameters) -> Model:
     """An untrained model by its name; parameters are its class's, such as seed and device. Raises InputError for unknown names."""
     if name.startswith(OPPONENT):
-        from .opponent import opponent
+        from .opponents import opponent
 
         return opponent(model_class(name.removeprefix(OPPONENT))(**parameters))
     return model_class(name)(**parameters)
