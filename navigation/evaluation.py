@@ -90,6 +90,8 @@ def recovered_headings(
 
     scan: width of the scan (rad), centred on the headings `about`, which a full one does not need.
     """
+    if len(views) == 0:
+        return np.empty(0)
     familiarity = model.scan(views).cpu().numpy()
     turns = np.zeros(len(facing)) if about is None else wrap_angle(about - facing)
     windows = np.stack([scan_window(familiarity.shape[1], scan, turn) for turn in turns])

@@ -46,7 +46,7 @@ class StudyOptions(PathOptions):
         from .studies.thesis import run_studies
 
         self.check()
-        about = self.about() | ({} if only is None else {"Figure": only})
+        about = self.about(names) | ({} if only is None else {"Figure": only})
         exhibits_of(names, only)
         check_report_folder(self.out, about, overwrite=self.overwrite)
         runs, first = {}, None
@@ -56,7 +56,8 @@ class StudyOptions(PathOptions):
                 material = self.material(seed)
             first = first or material
             settings = Settings(seed=seed, quick=self.quick)
-            say(f"seed {seed} of {self.all_seeds()[0]} to {self.all_seeds()[-1]}")
+            if len(self.all_seeds()) > 1:
+                say(f"seed {seed} of {self.all_seeds()[0]} to {self.all_seeds()[-1]}")
             with progress_of_parts() as report:
                 runs[seed] = run_studies(material, settings, self.out / "findings", names, report)
         assert first is not None
@@ -100,7 +101,7 @@ class StudyOptions(PathOptions):
         """Columns and rows of a panorama; a first look takes half as many."""
         return (360, 75) if self.quick and self.size is None else super().width_and_height()
 
-    def about(self) -> dict[str, Any]:
+    def about(self, names: tuple[str, ...]) -> dict[str, Any]:
         """What is studied, in words."""
         from world.params import PRESETS
 
@@ -112,10 +113,16 @@ class StudyOptions(PathOptions):
             seen = {
                 "World": world, "Route": "generated" if self.route is None else str(self.route),
                 "Views": f"{width} x {height} pixels, one every {100 * self.spacing_m:g} cm of the route",
+                "Eye": f"{self.eye_height_m:g} m high, from {self.bottom_deg:g} to {self.top_deg:g} degrees"
+                + (f", {self.samples} x {self.samples} rays a pixel" if self.samples else ""),
             }  # fmt: skip
         first, last = self.all_seeds()[0], self.all_seeds()[-1]
         seeds = str(first) if last == first else f"{first} to {last}; figures and tables are of the first"
-        return seen | {"Seeds": seeds} | ({"Depth": "a first look (--quick)"} if self.quick else {})
+        return (
+            seen
+            | {"Studies": ", ".join(names), "Seeds": seeds}
+            | ({"Depth": "a first look (--quick)"} if self.quick else {})
+        )
 
     def command(self) -> str:
         """How one figure of the report is made alone; {study} and {figure} are to be filled in."""
@@ -127,7 +134,7 @@ class StudyOptions(PathOptions):
             flag = f"--{each.name.replace('_', '-')}"
             words += [flag] if value is True else [flag, str(value)]
         given = shlex.join(words).replace("{", "{{").replace("}", "}}")
-        return f"tussock study {{study}} --figure {{figure}}{' ' * bool(given)}{given} --out figure"
+        return f"tussock study {{study}} --figure {{figure}}{' ' * bool(given)}{given} --out {{name}}"
 
 
 @dataclass

@@ -72,6 +72,7 @@ def test_results_hold_published_and_obtained_numbers(replication):
             for spread in claim["obtained"].values()
         )
         assert len(claim["holds"]) == 1
+    assert studies["corners"]["holds"].keys() == {"corners-change-faster", "worse-in-corners", "more-corner-views-help"}
 
 
 def test_the_page_is_self_contained_and_has_everything(replication):
@@ -137,6 +138,13 @@ def test_a_report_of_something_else_is_not_replaced(replication, capsys):
         main(["replicate", "thesis", *TINY, "--seed", "3", "--out", str(replication)])
     assert end.value.code == 2
     assert "holds a report of something else (Seeds)" in capsys.readouterr().err
+
+
+def test_another_study_does_not_replace_a_report(replication, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["study", "setting", *TINY, "--out", str(replication)])
+    assert end.value.code == 2
+    assert "holds a report of something else (Studies)" in capsys.readouterr().err
 
 
 def test_one_figure_alone(replication, tmp_path):

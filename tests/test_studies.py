@@ -17,7 +17,8 @@ from navigation.studies import published
 from navigation.studies.classifier import FIRST, held_out_views
 from navigation.studies.confidence import _chance
 from navigation.studies.corners import corner_section, corner_views, equally_different, turning
-from navigation.studies.findings import Claim, Findings, keep, kept, plain
+from navigation.studies.findings import Claim, Findings, plain, read_findings, write_findings
+from navigation.studies.grid_search import share_of
 from navigation.studies.headings import box_of, errors_of, headings
 from navigation.studies.material import Material, material_of_databases, material_of_world
 from navigation.studies.settings import Settings
@@ -170,6 +171,13 @@ def test_corners_of_a_bent_route_are_around_its_bend():
     assert first < len(route.poses) // 2 < last
 
 
+def test_a_straight_route_has_no_corners_and_still_a_part_to_look_at():
+    straight = Route.through(np.column_stack([np.linspace(0, 3, 150), np.zeros(150)]))
+    assert len(corner_views(straight)) == 0
+    first, last = corner_section(straight)
+    assert 0 <= first < last < 150
+
+
 @given(hnp.arrays(float, st.integers(5, 80), elements=st.floats(0.1, 10)), st.integers(2, 20))
 def test_equally_different_views_span_the_route_in_steps_of_like_size(steps, views):
     chosen = equally_different(steps, views)
@@ -182,6 +190,15 @@ def test_equally_different_views_span_the_route_in_steps_of_like_size(steps, vie
 
 def test_equal_steps_choose_evenly():
     assert equally_different(np.ones(20), 5).tolist() == [0, 5, 10, 15, 20]
+
+
+def test_ties_in_a_search_are_not_decided_by_their_order():
+    table = pd.DataFrame(
+        {"mean_test_score": [0.9, 0.8, 0.8, 0.8, 0.7], "param_solver": ["adam", "sgd", "lbfgs", "lbfgs", "adam"]}
+    )
+    assert share_of("adam", table, 1) == 1
+    assert share_of("lbfgs", table, 2) == 0.5
+    assert share_of("lbfgs", table.iloc[[0, 2, 3, 1, 4]], 2) == 0.5
 
 
 # Findings on disk
@@ -197,26 +214,26 @@ def example() -> Findings:
 
 def test_findings_come_back_as_they_were(tmp_path):
     path = tmp_path / "f.json"
-    keep(example(), path, "key")
-    back = kept(path, "key")
+    write_findings(example(), path, "key")
+    back = read_findings(path, "key")
     assert back is not None
     assert back.claims == example().claims
     pd.testing.assert_frame_equal(back.tables["t"], example().tables["t"])
     assert back.numbers == {"n": 0.1, "several": [1, 2]}
-    assert kept(path, "another key") is None
-    assert kept(tmp_path / "missing.json", "key") is None
+    assert read_findings(path, "another key") is None
+    assert read_findings(tmp_path / "missing.json", "key") is None
 
 
 @pytest.mark.parametrize("spoil", ["cut", "digit", "empty", "binary", "another shape"])
 def test_damaged_findings_are_noticed(tmp_path, spoil):
     path = tmp_path / "f.json"
-    keep(example(), path, "key")
+    write_findings(example(), path, "key")
     whole = path.read_bytes()
     path.write_bytes({
         "cut": whole[:-40], "digit": whole.replace(b"0.333", b"0.334"), "empty": b"", "binary": b"\xff\x00" * 9, "another shape": b"[1]",
     }[spoil])  # fmt: skip
     with pytest.raises(ValueError):  # noqa: PT011 (says why, whatever it is)
-        kept(path, "key")
+        read_findings(path, "key")
 
 
 def test_plain_json_has_no_nan_and_no_numpy():
@@ -226,7 +243,7 @@ def test_plain_json_has_no_nan_and_no_numpy():
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.5, "0.5"), (12.0, "12"), (110.4, "110"), (float("nan"), "–"), (True, "yes"), ([20, 20], "20, 20")],
+    [(0.5, "0.5"), (12.0, "12"), (110.4, "110"), (float("nan"), "–"), (True, "yes"), (None, "–"), ([20, 20], "20, 20")],
 )
 def test_numbers_as_people_read_them(value, text):
     assert cell(value) == text
@@ -253,12 +270,15 @@ def test_databases_that_do_not_fit_a_study_are_refused(material, tmp_path):
     with open_renderer(WORLD, EYE) as renderer:
         write_database(tmp_path / "grid", renderer, Grid.over(published_part(WORLD.field), 0.2))
         write_database(tmp_path / "route", renderer, ROUTE.resampled(0.1).poses)
+        write_database(tmp_path / "fine", renderer, ROUTE.resampled(0.02).poses)
+        write_database(tmp_path / "coarse", renderer, Grid(begin=(0.0, 0.0), spacing=0.1, size=(2, 2)))
     with open_renderer(WORLD, Eye(width=36, height=15, samples=1)) as renderer:
         write_database(tmp_path / "small", renderer, ROUTE.resampled(0.02).poses)
     cases = (
         ("route", "route", "give one of a grid"),
         ("grid", "small", "different sizes"),
         ("grid", "route", "20 route views; a study needs at least 48"),
+        ("coarse", "fine", "0 grid places lie within 0.2 m"),
     )
     for grid, route, why in cases:
         with pytest.raises(InputError, match=why):

@@ -222,7 +222,8 @@ def in_span(inputs: torch.Tensor, layer: tuple) -> tuple[torch.Tensor, tuple, Ca
 
     Gradients of the weights lie in the span of the views, all but that of the penalty, which shrinks what is orthogonal to it. So
     n coordinates of a unit's weights, and the length of their orthogonal rest, are all that training by a method that rotations of
-    the weights do not change can alter: gradient descent and L-BFGS, not Adam. Returns views, layer and the way back of a layer.
+    the weights do not change can alter: gradient descent and L-BFGS, not Adam. (L-BFGS stops by the largest component of the
+    gradient, which is another one here.) Returns views, layer and the way back of a layer.
     """
     weights, biases = layer
     basis = torch.linalg.qr(inputs.T).Q  # (pixels, n)

@@ -37,7 +37,8 @@ def plans(xy: np.ndarray, columns: int = 1) -> tuple[Figure, np.ndarray]:
     """Axes side by side for plans that show the points xy (m), as large as they fit."""
     across, up = np.ptp(xy, axis=0) + 2 * MARGIN
     scale = min((MOST_WIDE - 0.7) / columns / across, MOST_HIGH / up)
-    return canvas((scale * across * columns + 0.7 + 0.15 * columns, scale * up + 0.9), 1, columns, sharey=True)
+    width = max(2.4 * columns, scale * across * columns + 0.7 + 0.15 * columns)  # titles need room
+    return canvas((width, scale * up + 0.9), 1, columns, sharey=True)
 
 
 @lru_cache(maxsize=16)

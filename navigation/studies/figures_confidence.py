@@ -42,8 +42,9 @@ def _short_and_long(found: Findings, material: Material, settings: Settings) -> 
 
 
 @picture(
-    "35, 36", "confidence", "A heading recovered, a heading reversed",
-    "Two places beside straights (circled), and the confidence at every rotation: the network was never taught what lies behind.",
+    "35, 36", "confidence", "A heading recovered, a heading lost",
+    """The places beside straights whose headings are the least and the most off (circled), and the confidence at every rotation
+    there. The network was never taught what lies behind.""",
 )  # fmt: skip
 def _reversed(found: Findings, material: Material, settings: Settings) -> Figure:
     figure, axes = canvas((7.2, 6.0), 1, 2, width_ratios=(1, 1.6))
@@ -70,7 +71,8 @@ def _narrow_scans(found: Findings, material: Material, settings: Settings) -> Fi
 
 @picture(
     "39", "confidence", "What a narrower scan leaves out",
-    "Confidence at the reversed place; the shaded rotations are those that a scan of 180 degrees about the general direction looks at.",
+    """Confidence at the place that is the most off; the shaded rotations are those that a scan of 180 degrees about the general
+    direction looks at.""",
 )  # fmt: skip
 def _left_out(found: Findings, material: Material, settings: Settings) -> Figure:
     figure = _curves(found, [("reversed", found.numbers["iterations"][1], "")])
@@ -103,14 +105,11 @@ def _beyond(found: Findings, material: Material, settings: Settings) -> Figure:
     "Headings of the thesis's classifier (left) and of mlp-rotation on edges (right), both over 360 degrees.",
 )  # fmt: skip
 def _beyond_headings(found: Findings, material: Material, settings: Settings) -> Figure:
-    names = [name for name in found.tables if name.startswith("headings, mlp")]
-    rotation = [name for name in names if "mlp-rotation" in name][-1]
-    return diagrams(
-        found.tables,
-        material.route,
-        material.world,
-        {names[0]: "the thesis's classifier", rotation: "mlp-rotation, edges"},
-    )
+    names = {
+        "headings, mlp, grey, every 6th": "the thesis's classifier",
+        "headings, mlp-rotation, edges, every 6th": "mlp-rotation, edges",
+    }
+    return diagrams(found.tables, material.route, material.world, names)
 
 
 def _curves(found: Findings, chosen: list[tuple[str, int, str]]) -> Figure:

@@ -12,6 +12,7 @@ from .drawing import (
     diagrams,
     draw_route,
     heading_diagram,
+    nothing,
     plan,
     plans,
 )
@@ -153,6 +154,8 @@ def _more_views(found: Findings, material: Material, settings: Settings) -> Figu
 def _before_and_after(found: Findings, material: Material, settings: Settings) -> Figure:
     chosen = found.tables["selections"].columns[3:5]
     first = found.tables[f"headings, {chosen[0]}"]
+    if int(first["in_section"].sum()) == 0:
+        return nothing("no grid place lies beside the part looked at")
     figure, axes = plans(first.loc[first["in_section"], ["x_m", "y_m"]].to_numpy(), 2)
     for axis, name in zip(axes[0], chosen, strict=True):
         table = found.tables[f"headings, {name}"]

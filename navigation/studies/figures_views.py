@@ -118,7 +118,7 @@ def _occluded(found: Findings, material: Material, settings: Settings) -> Figure
         axes[1, 0], known, f"the route view, {row['distance_m']:.2f} m away: {row['reference_covered']:.0%} covered"
     )
     around_circle(axes[2, 0], table["degrees_off"], table["rms"])
-    axes[2, 0].set_ylabel("RMS difference")
+    axes[2, 0].set(ylabel="RMS difference", xlim=(180, -180))  # left on the left, as in the panoramas
     axes[2, 0].set_title(f"{row['error_deg']:.0f}° off", fontsize=9)
     for axis in axes[:2, 0]:
         axis.set_xlabel("")
@@ -134,7 +134,7 @@ def _error_by_distance(found: Findings, material: Material, settings: Settings) 
     axis, around, rings = axes[0, 0], found.tables["around"], found.tables["by_distance"]
     references = around["reference"].unique()
     for reference, colour in zip(
-        references[[1, len(references) // 2, -2]], (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR), strict=True
+        references[[0, len(references) // 2, -1]], (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR), strict=True
     ):
         table = around[around["reference"] == reference]
         axis.plot(table["distance_m"], table["error_deg"], "o", ms=3.5, color=colour, alpha=0.8)

@@ -18,7 +18,8 @@ class Claim:
     """What the thesis claims, and whether it holds here.
 
     key: stable name. statement: the claim. figure: number of the figure that shows it. published, obtained: numbers by the same
-    labels, units in them; a published one is missing where the thesis only draws it. holds: going by `test`, in words.
+    labels, units in them; a published one is missing where the thesis only draws it. holds: going by `test`, in words; None where
+    there is nothing to go by, as for corners on a straight route.
     """
 
     key: str
@@ -27,7 +28,7 @@ class Claim:
     published: dict[str, float]
     obtained: dict[str, float]
     test: str
-    holds: bool
+    holds: bool | None
     note: str = ""
 
 
@@ -68,7 +69,7 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def keep(findings: Findings, path: Path, key: str) -> None:
+def write_findings(findings: Findings, path: Path, key: str) -> None:
     """Write findings with the key of what they were found in, and a digest that shows damage."""
     text = json.dumps(findings.to_json())
     digest = hashlib.sha256((key + text).encode()).hexdigest()
@@ -76,7 +77,7 @@ def keep(findings: Findings, path: Path, key: str) -> None:
         partial.write_text(json.dumps({"key": key, "digest": digest, "findings": text}))
 
 
-def kept(path: Path, key: str) -> Findings | None:
+def read_findings(path: Path, key: str) -> Findings | None:
     """Findings from a file, or None where it is not there or belongs to another key. Raises ValueError for a damaged one."""
     if not path.exists():
         return None

@@ -78,3 +78,9 @@ def best_tuning(table: pd.DataFrame) -> dict[str, Any]:
 def same_score(table: pd.DataFrame) -> int:
     """How many tunings share the highest validation score."""
     return int(np.isclose(table["mean_test_score"], table["mean_test_score"].iloc[0]).sum())
+
+
+def share_of(solver: str, table: pd.DataFrame, best: int) -> float:
+    """Share of a solver in the `best` first tunings and all that score alike, so that ties are not decided by their order."""
+    least = table["mean_test_score"].iloc[min(best, len(table)) - 1]
+    return float((table.loc[table["mean_test_score"] >= least - 1e-9, "param_solver"] == solver).mean())

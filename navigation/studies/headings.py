@@ -50,3 +50,8 @@ def box_of(errors: pd.Series) -> dict[str, float]:
         "median_error_deg": middle, "mean_error_deg": errors.mean(), "lower_quartile_deg": low, "upper_quartile_deg": high,
         "lower_whisker_deg": min(low, within.min()), "upper_whisker_deg": max(high, within.max()), "places": len(errors),
     }  # fmt: skip
+
+
+def middle(tables: Sequence[pd.DataFrame], where: np.ndarray) -> float:
+    """Median over tables (random starts) of the median error at some of their rows (degrees); nan where there are none."""
+    return float(np.median([table.loc[where, "error_deg"].median() for table in tables]))

@@ -78,7 +78,8 @@ def material_of_world(
 ) -> Material:  # fmt: skip
     """Draw the views along a route and at the grid beside it, at the poses that a database of them would hold."""
     views = Route(as_kept(route.resampled(spacing).poses))
-    every = as_kept(Grid.over(published_part(world.field), GRID).poses())
+    part = published_part(world.field)
+    every = as_kept(Grid.over(part if part.contains(*route.xy.T).all() else world.field, GRID).poses())
     places = every[views.nearest(every[:, :2])[0] <= BESIDE]
     check_enough(views, places)
     with open_renderer(world, eye, backend) as renderer:
@@ -88,12 +89,14 @@ def material_of_world(
         )  # fmt: skip
 
 
-def material_of_databases(grid: Path, route: Path, *, world: World | None = None) -> Material:
+def material_of_databases(grid: Path, route: Path) -> Material:
     """Read the views along a route and at the grid beside it from two image databases. Raises InputError for unusable ones."""
     grid_database, route_database = read_database(grid), read_database(route)
     for database, kind in ((grid_database, "grid"), (route_database, "route")):
         if database.kind != kind:
             raise InputError(f"{database.folder} is a database of a {database.kind}; give one of a {kind}")
+        if database.metadata.get("needsUnwrapping"):
+            raise InputError(f"{database.folder} holds images that need unwrapping; a study takes panoramas")
         bad = np.flatnonzero(~np.isfinite(database.poses).all(axis=1))
         if len(bad):
             raise InputError(f"{database.folder}, row {bad[0] + 1} of its entries: a place or heading is missing")
@@ -104,12 +107,13 @@ def material_of_databases(grid: Path, route: Path, *, world: World | None = None
     places = grid_database.poses[rows]
     check_enough(views, places)
     route_views, place_views = route_database.views(), grid_database.views(rows.tolist())
+    channels = min(route_views.shape[3], place_views.shape[3])  # alpha counts where both have it
+    route_views, place_views = route_views[..., :channels], place_views[..., :channels]
     if route_views.shape[1:] != place_views.shape[1:]:
         sizes = " and ".join(f"{views.shape[2]} x {views.shape[1]}" for views in (route_views, place_views))
         raise InputError(f"{route} and {grid} hold views of different sizes ({sizes}); a study needs them alike")
     return Material(
-        route=views, route_views=route_views, places=places, place_views=place_views, grid=grid_database.poses[:, :2],
-        world=world,
+        route=views, route_views=route_views, places=places, place_views=place_views, grid=grid_database.poses[:, :2], world=None,
     )  # fmt: skip
 
 
@@ -119,7 +123,8 @@ def check_enough(route: Route, places: Float[np.ndarray, "m 3"]) -> None:
         raise InputError(
             f"{len(route.poses)} route views; a study needs at least {LEAST_VIEWS}: give a longer route or a smaller spacing"
         )
-    if len(places) < LEAST_PLACES:
+    near = int((route.nearest(places[:, :2])[0] <= NEAR).sum()) if len(places) else 0
+    if near < LEAST_PLACES:
         raise InputError(
-            f"{len(places)} grid places lie within {BESIDE:g} m of the route; a study needs at least {LEAST_PLACES}"
+            f"{near} grid places lie within {NEAR:g} m of the route; a study needs at least {LEAST_PLACES}"
         )

@@ -78,7 +78,7 @@ def resolution(material: Material, settings: Settings, progress=lambda done, tot
 
     The thesis's twenty numbers are given beside views that are sampled, as cv2.resize does by default, and views that are averaged.
     """
-    factors = published.FACTORS[1::2] if settings.quick else published.FACTORS
+    factors = published.FACTORS[::3] if settings.quick else published.FACTORS
     runs = [(way, smoothed, factor) for way in RESIZING for smoothed in (False, True) for factor in factors]
     rows, boxes, unresized = [], [], {}
     for done, (way, smoothed, factor) in enumerate(runs):
@@ -184,7 +184,7 @@ def _best_factor(boxes: pd.DataFrame) -> Claim:
         statement="A middle resolution is better than the original one.",
         published={"best factor, text of 4.3.4": 6.0, "best factor, table of 7.3": table},
         obtained={"best factor": found},
-        test="the lowest median error with smoothing is at a factor over 1",
-        holds=found > 1,
+        test="the lowest median error with smoothing is at neither the first nor the last factor",
+        holds=1 < found < max(published.FACTORS),
         note="The thesis's text puts the minimum at factor 6; its own table has it at 3.",
     )

@@ -36,19 +36,23 @@ class Verdict:
 
     claim: Claim
     obtained: dict[str, tuple[float, float, float]]
-    holds: list[bool]
+    holds: list[bool | None]
 
     @property
     def words(self) -> str:
         """Whether it holds, as people say it."""
-        held, of = sum(self.holds), len(self.holds)
-        if of == 1:
+        tested = [each for each in self.holds if each is not None]
+        held, of = sum(tested), len(tested)
+        if of == 0:
+            return "not tested"
+        if len(self.holds) == 1:
             return "holds" if held else "does not hold"
-        return f"holds in {held} of {of}" if held else f"holds in none of {of}"
+        return f"holds in {held or 'none'} of {of}"
 
     @property
     def colour(self) -> str:
-        return "yes" if all(self.holds) else "partly" if any(self.holds) else "no"
+        tested = [each for each in self.holds if each is not None]
+        return "untested" if not tested else "yes" if all(tested) else "partly" if any(tested) else "no"
 
 
 def verdicts(runs: Runs) -> list[Verdict]:
@@ -141,9 +145,9 @@ def _exhibit(
     """What the page shows of a figure or table."""
     thesis = each.number[0].isdigit()
     shown = {
-        "name": _name(each), "title": each.title, "command": command.format(study=each.study, figure=f"'{each.number}'"),
+        "name": _name(each), "title": each.title, "command": command.format(study=each.study, figure=f"'{each.number}'", name=_name(each)),
         "heading": ("Figure " if isinstance(each, Picture) else "Table ") + each.number if thesis else "Beyond the figures",
-        "claims": [_shown(verdict) for verdict in judged if verdict.claim.figure in _numbers(each) and _study_of(verdict) == each.study],
+        "claims": [_shown(verdict) for verdict in judged if _exhibit_of(verdict) is each],
     }  # fmt: skip
     if isinstance(each, Picture):
         return (
@@ -160,8 +164,8 @@ def _exhibit(
     }
 
 
-def _study_of(verdict: Verdict) -> str:
-    return next(each.study for each in (*PICTURES, *LISTINGS) if verdict.claim.figure in _numbers(each))
+def _exhibit_of(verdict: Verdict) -> Picture | Listing:
+    return next(each for each in (*PICTURES, *LISTINGS) if verdict.claim.figure in _numbers(each))
 
 
 def _draw(each: Picture, findings: Findings, material: Material, settings: Settings, folder: Path) -> dict[str, Any]:
@@ -184,7 +188,6 @@ def _draw(each: Picture, findings: Findings, material: Material, settings: Setti
 def _shown(verdict: Verdict) -> dict[str, Any]:
     """What the page shows of a claim: a row of numbers for each label, published and obtained."""
     claim = verdict.claim
-    exhibit = next(each for each in (*PICTURES, *LISTINGS) if claim.figure in _numbers(each))
     labels = list(dict.fromkeys([*claim.obtained, *claim.published]))
     numbers = [(label, claim.published.get(label), verdict.obtained.get(label)) for label in labels]
     return {
@@ -192,7 +195,7 @@ def _shown(verdict: Verdict) -> dict[str, Any]:
         "numbers": numbers,
         "words": verdict.words,
         "colour": verdict.colour,
-        "link": _name(exhibit),
+        "link": _name(_exhibit_of(verdict)),
     }
 
 

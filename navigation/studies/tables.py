@@ -151,6 +151,8 @@ LISTINGS = [
 
 def cell(value: object) -> str:
     """A number as people read it."""
+    if value is None:
+        return "–"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

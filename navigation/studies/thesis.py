@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ..terminal import say
-from . import beyond, classifier, confidence, corners, perfect_memory, setting, visual_compass
-from .findings import Findings, keep, kept, plain
+from . import beyond, classifier, confidence, corners, perfect_memory, visual_compass, world_and_views
+from .findings import Findings, plain, read_findings, write_findings
 from .material import Material
 from .settings import Settings
 
 VERSION = (
-    1  # of the studies; a change that alters what they find counts it up, and what earlier ones kept is done again
+    2  # of the studies: counted up by a change that alters what they find; what earlier ones kept is then done again
 )
 Progress = Callable[[int, int], object]
 
@@ -30,7 +30,7 @@ class Study:
 
 
 STUDIES = {
-    "setting": Study(title="The world and its views", run=setting.study),
+    "setting": Study(title="The world and its views", run=world_and_views.study),
     "visual-compass": Study(title="One snapshot as a compass", run=visual_compass.study),
     "frequency": Study(title="Perfect memory, and how many views it needs", run=perfect_memory.frequency),
     "resolution": Study(title="Resolution and smoothing", run=perfect_memory.resolution),
@@ -66,7 +66,7 @@ def _study(
     study, key = STUDIES[name], _key(name, material, settings)
     path = folder / f"{name}-{key[:12]}.json"
     try:
-        earlier = kept(path, key)
+        earlier = read_findings(path, key)
     except ValueError as error:
         say(f"{path} is damaged ({error}); the study is done again")
         earlier = None
@@ -78,7 +78,7 @@ def _study(
     given = {"tuning": classifier.tuning_of(found["classifier"])} if "classifier" in study.needs else {}
     findings = study.run(material, settings, progress, **given)
     findings.numbers["seconds"] = round(time.perf_counter() - began, 1)
-    keep(findings, path, key)
+    write_findings(findings, path, key)
     say(f"{name}: done in {findings.numbers['seconds']:.0f} s")
     return Findings.from_json(findings.to_json())  # the same whether it was kept or not
 

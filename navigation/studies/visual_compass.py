@@ -122,7 +122,7 @@ def _ambiguous(around: pd.DataFrame, curves: dict[int, dict[int, np.ndarray]]) -
     chosen = []
     for index in wrong.sort_values(["minima", "distance_m"], ascending=[False, True], kind="stable").index:
         bad = around.loc[index]
-        good = around[(around["reference"] == bad["reference"]) & (around["error_deg"] < 10)]
+        good = around[(around["reference"] == bad["reference"]) & (around["error_deg"] < 10) & (around["minima"] == 1)]
         if len(good):
             apart = np.hypot(good["x_m"] - bad["x_m"], good["y_m"] - bad["y_m"])
             chosen = [_pick(around, curves, apart.idxmin(), "recovered"), _pick(around, curves, index, "ambiguous")]
@@ -173,7 +173,7 @@ def _claims(around: pd.DataFrame, curves: pd.DataFrame) -> list[Claim]:
         Claim(
             key="idf-minimum",
             figure="6",
-            statement="The image difference has a minimum of zero at the same place, a higher one nearby, and none to rely on far away.",
+            statement="The image difference has a minimum of zero at the same place, a higher one nearby, and a higher one still far away.",
             published={"lowest RMS at the same place": 0.0},
             obtained={
                 "lowest RMS at the same place": float(lowest["same"]),
