@@ -150,7 +150,7 @@ def test_another_study_does_not_replace_a_report(replication, capsys):
 def test_one_figure_alone(replication, tmp_path):
     page = (replication / "report.html").read_text(encoding="utf-8")
     assert (
-        "tussock study frequency --figure &#39;14&#39; --world tiny --size 72x15 --spacing-m 0.04 --quick --out figure"
+        "tussock study frequency --figure &#39;14&#39; --world tiny --size 72x15 --spacing-m 0.04 --quick --out figure-14"
         in page
     )
     done = tussock("study", "frequency", "--figure", "14", *TINY, "--out", tmp_path / "one", "--json")
