@@ -1,5 +1,6 @@
 """What all tests share. Shapes and types in signatures are checked while the tests run."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,9 @@ install_import_hook(CHECKED, "typecheck.check")
 # No test asserts a time, those of hypothesis included.
 settings.register_profile("no deadline", settings(), deadline=None)
 settings.load_profile("no deadline")
+
+# A shell has what it runs in the background ignore Ctrl-C, and so all that the tests start; they are to heed it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 

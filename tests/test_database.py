@@ -535,11 +535,11 @@ def test_a_route_from_the_command_line_and_its_check(capfd, tmp_path):
     out = tmp_path / "r"
     code, printed, _ = tussock(capfd, "route", *SMALL, "--route", tmp_path / "r.csv", "--out", out, "--json")
     assert code == 0
-    assert json.loads(printed)["images"] == 200
+    assert json.loads(printed)["images"] == 201
     assert np.allclose(read_database(out).poses[[0, 1]], [(0.5, 0.5, 0), (0.52, 0.5, 0)])
     code, printed, _ = tussock(capfd, "check", out, "--json")
     assert code == 0
-    assert json.loads(printed) == {"database": str(out), "type": "route", "images": 200, "problems": [], "ok": True}
+    assert json.loads(printed) == {"database": str(out), "type": "route", "images": 201, "problems": [], "ok": True}
     (out / "image_00003.png").unlink()
     code, printed, _ = tussock(capfd, "check", out, "--json")
     problem = {"kind": "missing-image", "where": f"{ENTRIES}, line 5", "what": "there is no image_00003.png"}

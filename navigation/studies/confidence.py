@@ -37,7 +37,7 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
             tables[iterations, seed, scan] = table
         trained[iterations, seed] = network
         progress(done + 1, len(runs))
-    results = pd.DataFrame(rows)
+    results, chance = pd.DataFrame(rows), _chance(material)
     short, long = settings.iterations
     seed = _middle_seed(results, long)
     recovered, reversed_ = _examples(material, tables[long, seed, 360])
@@ -48,13 +48,13 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
     ]
     names = {"short": (short, 360), "long": (long, 360), "scan_180": (long, 180), "scan_90": (long, 90)}
     return Findings(
-        tables={"networks": results, "curves": pd.concat(curves, ignore_index=True), "chance": _chance(material)}
+        tables={"networks": results, "curves": pd.concat(curves, ignore_index=True), "chance": chance}
         | {f"headings_{name}": tables[iterations, seed, scan] for name, (iterations, scan) in names.items()},
         numbers={
             "iterations": [short, long], "general_direction_deg": float(np.degrees(material.general_direction)),
             "place_recovered": recovered, "place_reversed": reversed_, "seed_shown": seed,
         },
-        claims=_claims(results, _chance(material), settings),
+        claims=_claims(results, chance, settings),
     )  # fmt: skip
 
 

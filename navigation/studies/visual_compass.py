@@ -35,16 +35,17 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
         progress(done + 1, len(references))
     around = pd.concat(rows, ignore_index=True)
     shown = _typical(around)
+    three = _three_curves(material, shown, places)
     return Findings(
         tables={
             "around": around,
             "by_distance": _by_distance(around),
-            "idf": _three_curves(material, shown, places),
+            "idf": three,
             "ambiguous": _ambiguous(around, curves),
             "occluded": _occluded(material, around, curves),
         },
         numbers={"reference_shown": shown} | _examples(around),
-        claims=_claims(around, _three_curves(material, shown, places)),
+        claims=_claims(around, three),
     )
 
 
