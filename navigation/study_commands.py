@@ -61,9 +61,8 @@ class StudyOptions(PathOptions):
             with progress_of_parts() as report:
                 runs[seed] = run_studies(material, settings, self.out / "findings", names, report)
         assert first is not None
-        settings = Settings(seed=self.seed, quick=self.quick)
         runs = {seed: {name: run[name] for name in names} for seed, run in runs.items()}
-        write_report(self.out, runs, first, settings, about=about, command=self.command(), title=title, only=only)
+        write_report(self.out, runs, first, about=about, command=self.command(), title=title, only=only)
         judged = verdicts(runs)
         return {
             "report": str(self.out / "report.html"), "results": str(self.out / "results.json"),

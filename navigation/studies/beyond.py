@@ -14,20 +14,20 @@ from .corners import corner_views, differences, equally_different
 from .findings import Claim, Findings
 from .headings import errors_of, headings
 from .material import Material
-from .settings import Settings
+from .settings import ENCODING, Settings
 
 EDGES = Encoding.named("edges", resize=6)
 
 
 def study(material: Material, settings: Settings, progress=lambda done, total: None) -> Findings:
     """Heading errors over the full circle of other networks, features and choices of views, step by step from the thesis's own."""
-    learned = learned_views(material, settings)
+    learned = learned_views(material)
     choices = {
         "every 6th": learned,
         "equally different": equally_different(differences(material, 1), len(learned)),
         "every 2nd": np.arange(0, len(material.route.poses), 2),
     }
-    encodings = {"grey": settings.encoding, "edges": EDGES}
+    encodings = {"grey": ENCODING, "edges": EDGES}
     images = {
         name: (encoding(material.route_views), encoding(material.place_views)) for name, encoding in encodings.items()
     }

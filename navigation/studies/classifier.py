@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.special import expit
 from sklearn.metrics import classification_report
 
-from world.geometry import turn_of_columns, wrap_angle
+from world.geometry import turn_of_columns
 
 from ..familiarity import Images
 from ..models import MLP, make_model
@@ -16,22 +16,22 @@ from .findings import Claim, Findings
 from .grid_search import best_tuning, same_score, search, share_of, tunings
 from .headings import errors_of, headings
 from .material import Material
-from .settings import Settings
+from .settings import ENCODING, EVERY, Settings
 
 FIRST = 20  # training views of the small part (4.4.5)
 
 
 def study(material: Material, settings: Settings, progress=lambda done, total: None) -> Findings:
     """Tune, train and test the classifier on the first views and on the whole route; perfect memory beside it."""
-    views, places = settings.encoding(material.route_views), settings.encoding(material.place_views)
+    views, places = ENCODING(material.route_views), ENCODING(material.place_views)
     tables: dict[str, pd.DataFrame] = {
-        "training": _training(material, settings),
+        "training": _training(material),
         "one_place": _one_place(material, views, places),
     }
     numbers: dict[str, Any] = {"one_place_error_deg": float(tables["one_place"]["error_deg"].iloc[0])}
     before, total = 0, sum(tunings(part, settings) for part in PARTS)
     for part in PARTS:
-        learned, rows = _part(material, settings, part)
+        learned, rows = _part(material, part)
         tuned = search(part, views[learned], settings, lambda done, _, before=before: progress(before + done, total))
         before += len(tuned)
         tuning = best_tuning(tuned)
@@ -55,9 +55,9 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
 PARTS = ("first_20", "whole_route")
 
 
-def learned_views(material: Material, settings: Settings) -> np.ndarray:
+def learned_views(material: Material) -> np.ndarray:
     """Indices of the route views that are learned: one in `every` (4.3.3)."""
-    return np.arange(0, len(material.route.poses), settings.every)
+    return np.arange(0, len(material.route.poses), EVERY)
 
 
 def held_out_views(learned: np.ndarray) -> np.ndarray:
@@ -65,11 +65,11 @@ def held_out_views(learned: np.ndarray) -> np.ndarray:
     return ((learned[:-1] + learned[1:]) // 2)[::2]
 
 
-def _part(material: Material, settings: Settings, part: str) -> tuple[np.ndarray, np.ndarray]:
+def _part(material: Material, part: str) -> tuple[np.ndarray, np.ndarray]:
     """The learned views of a part of the route, and the near places whose nearest view lies on it."""
-    learned = learned_views(material, settings)
+    learned = learned_views(material)
     learned = learned[:FIRST] if part == "first_20" else learned
-    on_it = material.nearest[material.near] <= learned[-1] + settings.every // 2
+    on_it = material.nearest[material.near] <= learned[-1] + EVERY // 2
     return learned, material.near if part == "whole_route" else material.near[on_it]
 
 
@@ -105,9 +105,9 @@ def _report(truth: np.ndarray, guess: np.ndarray) -> pd.DataFrame:
     return pd.DataFrame([{"class": label} | rows[key] for key, label in names.items()])
 
 
-def _training(material: Material, settings: Settings) -> pd.DataFrame:
+def _training(material: Material) -> pd.DataFrame:
     """Every route view and what it is used for (figures 17 and 23)."""
-    learned = learned_views(material, settings)
+    learned = learned_views(material)
     use = np.full(len(material.route.poses), "not used", dtype=object)
     use[held_out_views(learned)] = "held out"
     use[learned] = "learned"
@@ -124,15 +124,6 @@ def _one_place(material: Material, views: Images, places: Images) -> pd.DataFram
     turns = np.degrees(turn_of_columns(np.arange(len(confidence)), len(confidence))) % 360
     found = headings(material, network, places, [row]).iloc[0]
     return pd.DataFrame({"turn_deg": turns, "confidence": confidence}).assign(**found)
-
-
-def confidence_curve(network: MLP, places: Images, material: Material, row: int) -> pd.DataFrame:
-    """Confidence of a network at every rotation of a place's view, in degrees to the left of the set heading."""
-    confidence = expit(network.scan(places[row : row + 1]).double().cpu().numpy()[0])
-    turns = turn_of_columns(np.arange(len(confidence)), len(confidence))
-    off = np.degrees(wrap_angle(turns + material.places[row, 2] - material.wanted[row]))
-    table = pd.DataFrame({"degrees_off": off, "confidence": confidence})
-    return table.sort_values("degrees_off", kind="stable", ignore_index=True)
 
 
 def _claims(tables: dict[str, pd.DataFrame], numbers: dict[str, Any]) -> list[Claim]:
@@ -166,10 +157,10 @@ def _claims(tables: dict[str, pd.DataFrame], numbers: dict[str, Any]) -> list[Cl
             statement="Having learned the whole route, it does not, for all its accuracy on held-out views.",
             published={
                 "median error, whole route (deg)": published.CLASSIFIER_MEDIAN_DEG["whole_route"],
-                "by the first 20 views'": published.CLASSIFIER_MEDIAN_DEG["whole_route"]
+                "over that of the first 20 views": published.CLASSIFIER_MEDIAN_DEG["whole_route"]
                 / published.CLASSIFIER_MEDIAN_DEG["first_20"],
             },
-            obtained={"median error, whole route (deg)": whole, "by the first 20 views'": whole / few},
+            obtained={"median error, whole route (deg)": whole, "over that of the first 20 views": whole / few},
             test="the median error is over 20 degrees, and twice that of the first 20 views or more",
             holds=whole > 20 and whole >= 2 * few if numbers["learned_whole_route"] >= 2 * FIRST else None,
         ),

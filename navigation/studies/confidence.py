@@ -9,12 +9,12 @@ from world.geometry import wrap_angle
 from ..familiarity import Images
 from ..models import MLP
 from . import published
-from .classifier import confidence_curve, learned_views
+from .classifier import learned_views
 from .corners import corner_views
 from .findings import Claim, Findings
-from .headings import RECOVERED_DEG, errors_of, headings
+from .headings import RECOVERED_DEG, around_set_heading, errors_of, headings
 from .material import Material
-from .settings import Settings
+from .settings import ENCODING, Settings
 
 SCANS_DEG = (360, 180, 90)
 REVERSED_DEG = 135.0  # farther off than this is nearer to the reverse than to a side
@@ -23,8 +23,8 @@ HIGH = 0.9  # of the range between a scan's lowest and highest confidence
 
 def study(material: Material, settings: Settings, progress=lambda done, total: None) -> Findings:
     """The thesis's network of the whole route, trained for a short and a long time, scanned in full and about one direction."""
-    views, places = settings.encoding(material.route_views), settings.encoding(material.place_views)
-    learned = learned_views(material, settings)
+    views, places = ENCODING(material.route_views), ENCODING(material.place_views)
+    learned = learned_views(material)
     tuning = published.BEST_TUNINGS["whole_route"][2]
     rows, trained, tables = [], {}, {}
     runs = [(iterations, seed) for iterations in settings.iterations for seed in settings.seeds]
@@ -42,7 +42,7 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
     seed = _middle_seed(results, long)
     recovered, reversed_ = _examples(material, tables[long, seed, 360])
     curves = [
-        confidence_curve(trained[iterations, seed], places, material, place).assign(iterations=iterations, place=name)
+        _curve(trained[iterations, seed], places, material, place).assign(iterations=iterations, place=name)
         for iterations in settings.iterations
         for name, place in (("recovered", recovered), ("reversed", reversed_))
     ]
@@ -56,6 +56,12 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
         },
         claims=_claims(results, chance, settings),
     )  # fmt: skip
+
+
+def _curve(network: MLP, places: Images, material: Material, row: int) -> pd.DataFrame:
+    """Confidence at every rotation of a place's view."""
+    confidence = expit(network.scan(places[row : row + 1]).double().cpu().numpy()[0])
+    return around_set_heading(confidence, material.places[row, 2], material.wanted[row], name="confidence")
 
 
 def _high_share(network: MLP, places: Images, rows: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from .findings import Claim, Findings
 from .grid_search import best_tuning, search
 from .headings import RECOVERED_DEG, middle
 from .material import Material
-from .settings import Settings
+from .settings import ENCODING, EVERY, Settings
 
 REACH = 0.3  # m; turning at a place is the change of direction from so far before to so far after
 SHARE = 0.2  # of the route at most: the part of it that turns the most is its corners ..
@@ -66,13 +66,13 @@ def study(
     material: Material, settings: Settings, progress=lambda done, total: None, *, tuning: dict[str, Any]
 ) -> Findings:
     """How fast views change, and what more of them in corners do. tuning: what the search on the whole route found best."""
-    views, places = settings.encoding(material.route_views), settings.encoding(material.place_views)
+    views, places = ENCODING(material.route_views), ENCODING(material.place_views)
     section = corner_section(material.route)
-    selections = _selections(material, settings, section)
+    selections = _selections(material, section)
     in_corner = np.isin(material.nearest[material.near], corner_views(material.route))
     in_section = _between(material.nearest[material.near], section)
     tuned = search("more_in_corners", views[selections["twice as many in corners"]], settings, progress)
-    tables: dict[str, pd.DataFrame] = {"change": _change(material, settings), "search": tuned}
+    tables: dict[str, pd.DataFrame] = {"change": _change(material), "search": tuned}
     rows, runs = [], [(name, learned, tuning) for name, learned in selections.items()]
     runs.append(("twice as many in corners, tuned anew", selections["twice as many in corners"], best_tuning(tuned)))
     for name, learned, parameters in runs:
@@ -97,10 +97,10 @@ def _between(index: np.ndarray, section: tuple[int, int]) -> np.ndarray:
     return (index >= section[0]) & (index <= section[1])
 
 
-def _selections(material: Material, settings: Settings, section: tuple[int, int]) -> dict[str, np.ndarray]:
+def _selections(material: Material, section: tuple[int, int]) -> dict[str, np.ndarray]:
     """Which route views are learned: the thesis's two choices, a control with as many more anywhere, and equal differences."""
-    learned = learned_views(material, settings)
-    between = np.arange(0, len(material.route.poses), max(1, settings.every // 2))
+    learned = learned_views(material)
+    between = np.arange(0, len(material.route.poses), max(1, EVERY // 2))
     corners = corner_views(material.route)
     more = between[np.isin(between, corners) & _between(between, section)]
     doubled = np.union1d(learned, more)
@@ -128,13 +128,13 @@ def equally_different(steps: Float[np.ndarray, " k"], views: int) -> Int[np.ndar
     return np.unique(np.searchsorted(sums, np.linspace(0, sums[-1], views) - 1e-9).clip(max=len(steps)))
 
 
-def _change(material: Material, settings: Settings) -> pd.DataFrame:
+def _change(material: Material) -> pd.DataFrame:
     """How much successive learned views differ, where, and how much the route turns there (figure 30)."""
-    learned = learned_views(material, settings)
+    learned = learned_views(material)
     middle = (learned[:-1] + learned[1:]) // 2
     x, y = material.route.xy[middle].T
     return pd.DataFrame({
-        "view": middle, "x_m": x, "y_m": y, "along_m": material.route.arc[middle], "rms": differences(material, settings.every),
+        "view": middle, "x_m": x, "y_m": y, "along_m": material.route.arc[middle], "rms": differences(material, EVERY),
         "turning_deg": np.degrees(turning(material.route)[middle]), "in_corner": np.isin(middle, corner_views(material.route)),
         "in_section": _between(middle, corner_section(material.route)),
     })  # fmt: skip

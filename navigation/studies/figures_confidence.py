@@ -16,14 +16,13 @@ from .drawing import (
 from .findings import Findings
 from .material import Material
 from .pictures import picture
-from .settings import Settings
 
 
 @picture(
     "33", "confidence", "Confidence after a short and a long training",
     "At a place whose heading is recovered, after {iterations[0]:,} and {iterations[1]:,} iterations.",
 )  # fmt: skip
-def _training_time(found: Findings, material: Material, settings: Settings) -> Figure:
+def _training_time(found: Findings, material: Material) -> Figure:
     return _curves(
         found, [("recovered", iterations, f"{iterations:,} iterations") for iterations in found.numbers["iterations"]]
     )
@@ -35,7 +34,7 @@ def _training_time(found: Findings, material: Material, settings: Settings) -> F
     "Headings after a short and a long training",
     "After {iterations[0]:,} (left) and {iterations[1]:,} iterations (right).",
 )
-def _short_and_long(found: Findings, material: Material, settings: Settings) -> Figure:
+def _short_and_long(found: Findings, material: Material) -> Figure:
     short, long = found.numbers["iterations"]
     names = {"headings_short": f"{short:,} iterations", "headings_long": f"{long:,} iterations"}
     return diagrams(found.tables, material.route, material.world, names)
@@ -46,7 +45,7 @@ def _short_and_long(found: Findings, material: Material, settings: Settings) -> 
     """The places beside straights whose headings are the least and the most off (circled), and the confidence at every rotation
     there. The network was never taught what lies behind.""",
 )  # fmt: skip
-def _reversed(found: Findings, material: Material, settings: Settings) -> Figure:
+def _reversed(found: Findings, material: Material) -> Figure:
     figure, axes = canvas((7.2, 6.0), 1, 2, width_ratios=(1, 1.6))
     table = found.tables["headings_long"]
     heading_diagram(axes[0, 0], table, material.route, material.world)
@@ -64,7 +63,7 @@ def _reversed(found: Findings, material: Material, settings: Settings) -> Figure
     "37, 38", "confidence", "Scans about the general direction",
     "Headings from scans of 360, 180 and 90 degrees about the direction from start to goal ({general_direction_deg:.0f} degrees).",
 )  # fmt: skip
-def _narrow_scans(found: Findings, material: Material, settings: Settings) -> Figure:
+def _narrow_scans(found: Findings, material: Material) -> Figure:
     names = {"headings_long": "360 degrees", "headings_scan_180": "180 degrees", "headings_scan_90": "90 degrees"}
     return diagrams(found.tables, material.route, material.world, names)
 
@@ -74,7 +73,7 @@ def _narrow_scans(found: Findings, material: Material, settings: Settings) -> Fi
     """Confidence at the place that is the most off; the shaded rotations are those that a scan of 180 degrees about the general
     direction looks at.""",
 )  # fmt: skip
-def _left_out(found: Findings, material: Material, settings: Settings) -> Figure:
+def _left_out(found: Findings, material: Material) -> Figure:
     figure = _curves(found, [("reversed", found.numbers["iterations"][1], "")])
     axis = figure.axes[0]
     middle = found.numbers["general_direction_deg"] - np.degrees(material.wanted[found.numbers["place_reversed"]])
@@ -87,7 +86,7 @@ def _left_out(found: Findings, material: Material, settings: Settings) -> Figure
     "beyond", "beyond", "Step by step from the thesis's network",
     "Median error over the full circle (bars), in corners and on straights (dots).",
 )  # fmt: skip
-def _beyond(found: Findings, material: Material, settings: Settings) -> Figure:
+def _beyond(found: Findings, material: Material) -> Figure:
     table = found.tables["by_model"].iloc[::-1]
     figure, axes = canvas((7.2, 4.2))
     axis, at = axes[0, 0], np.arange(len(table))
@@ -104,7 +103,7 @@ def _beyond(found: Findings, material: Material, settings: Settings) -> Figure:
     "beyond headings", "beyond", "The same places, the full circle",
     "Headings of the thesis's classifier (left) and of mlp-rotation on edges (right), both over 360 degrees.",
 )  # fmt: skip
-def _beyond_headings(found: Findings, material: Material, settings: Settings) -> Figure:
+def _beyond_headings(found: Findings, material: Material) -> Figure:
     names = {
         "headings, mlp, grey, every 6th": "the thesis's classifier",
         "headings, mlp-rotation, edges, every 6th": "mlp-rotation, edges",

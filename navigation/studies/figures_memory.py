@@ -20,14 +20,14 @@ from .drawing import (
 from .findings import Findings
 from .material import Material
 from .pictures import picture
-from .settings import Settings
+from .settings import ENCODING
 
 
 @picture(
     "12", "frequency", "Headings along the route, perfect memory",
     "Recovered headings at the {places} grid places within 0.2 m of the route, every route view remembered.",
 )  # fmt: skip
-def _perfect_memory(found: Findings, material: Material, settings: Settings) -> Figure:
+def _perfect_memory(found: Findings, material: Material) -> Figure:
     return diagrams(found.tables, material.route, material.world, {"headings": ""})
 
 
@@ -37,7 +37,7 @@ def _perfect_memory(found: Findings, material: Material, settings: Settings) -> 
     "Place recognition",
     "Each grid place is compared with the route view nearest to it; its heading is the set one.",
 )
-def _place_recognition(found: Findings, material: Material, settings: Settings) -> Figure:
+def _place_recognition(found: Findings, material: Material) -> Figure:
     figure, axes = plans(material.route.xy)
     axis, table = axes[0, 0], found.tables["headings"]
     draw_route(axis, material.route)
@@ -55,7 +55,7 @@ def _place_recognition(found: Findings, material: Material, settings: Settings) 
     "Error against how many views are remembered",
     "One route view in so many is remembered. Median and mean error.",
 )
-def _by_frequency(found: Findings, material: Material, settings: Settings) -> Figure:
+def _by_frequency(found: Findings, material: Material) -> Figure:
     figure, axes = canvas()
     table = found.tables["by_frequency"]
     lines(axes[0, 0], table["every"], {
@@ -69,7 +69,7 @@ def _by_frequency(found: Findings, material: Material, settings: Settings) -> Fi
     "15, 7.2", "frequency", "The same, as box plots",
     "Quartiles (boxes), values within 1.5 boxes of them (whiskers), medians (lines) and means (dots).",
 )  # fmt: skip
-def _frequency_boxes(found: Findings, material: Material, settings: Settings) -> Figure:
+def _frequency_boxes(found: Findings, material: Material) -> Figure:
     figure, axes = canvas()
     boxes(axes[0, 0], found.tables["by_frequency"], "every")
     axes[0, 0].set(
@@ -83,7 +83,7 @@ def _frequency_boxes(found: Findings, material: Material, settings: Settings) ->
     """Median error when views are sampled, as cv2.resize does by default (with and without Gaussian smoothing of {smoothing_px:g} pixels
     before), when they are averaged instead, and the thesis's numbers (dashed).""",
 )  # fmt: skip
-def _by_factor(found: Findings, material: Material, settings: Settings) -> Figure:
+def _by_factor(found: Findings, material: Material) -> Figure:
     figure, axes = canvas()
     table = found.tables["by_factor"]
     for smoothed, colour, name in ((False, PATH_COLOUR, "sampled"), (True, ROUTE_COLOUR, "sampled, smoothed")):
@@ -102,7 +102,7 @@ def _by_factor(found: Findings, material: Material, settings: Settings) -> Figur
     "7.3", "resolution", "The same, as box plots and means",
     "Left: views sampled without (red) and with smoothing (blue). Right: mean errors beside the thesis's (dashed).",
 )  # fmt: skip
-def _factor_boxes(found: Findings, material: Material, settings: Settings) -> Figure:
+def _factor_boxes(found: Findings, material: Material) -> Figure:
     figure, axes = canvas(WIDE, 1, 2)
     table = found.tables["by_factor"]
     for smoothed, colour, name in ((False, PATH_COLOUR, "sampled"), (True, ROUTE_COLOUR, "smoothed")):
@@ -121,10 +121,10 @@ def _factor_boxes(found: Findings, material: Material, settings: Settings) -> Fi
     "Preprocessing",
     "A view before and after: grey, smoothed, resized by the factor that the thesis chose (6).",
 )
-def _preprocessing(found: Findings, material: Material, settings: Settings) -> Figure:
+def _preprocessing(found: Findings, material: Material) -> Figure:
     figure, axes = canvas((7.2, 3.4), 2, 1)
     view = material.route_views[len(material.route_views) // 2]
     panorama(axes[0, 0], view, "before")
-    panorama(axes[1, 0], settings.encoding(view[None])[0].numpy(), str(settings.encoding))
+    panorama(axes[1, 0], ENCODING(view[None])[0].numpy(), str(ENCODING))
     axes[0, 0].set_xlabel("")
     return figure

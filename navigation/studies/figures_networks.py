@@ -19,14 +19,13 @@ from .drawing import (
 from .findings import Findings
 from .material import Material
 from .pictures import picture
-from .settings import Settings
 
 
 @picture(
     "17, 23", "classifier", "Views learned and held out",
     "One route view in six is learned (blue); those half-way between every second pair are held out to test the classifier (red).",
 )  # fmt: skip
-def _learned(found: Findings, material: Material, settings: Settings) -> Figure:
+def _learned(found: Findings, material: Material) -> Figure:
     figure, axes = plans(material.route.xy)
     for use, colour in (("not used", SOFT_COLOUR), ("learned", ROUTE_COLOUR), ("held out", PATH_COLOUR)):
         rows = found.tables["training"]
@@ -41,7 +40,7 @@ def _learned(found: Findings, material: Material, settings: Settings) -> Figure:
     "19", "classifier", "Views on and off the route",
     "For every learned view that faces along the route (blue), one turned by 60 degrees to one side, alternately (red).",
 )  # fmt: skip
-def _positives(found: Findings, material: Material, settings: Settings) -> Figure:
+def _positives(found: Findings, material: Material) -> Figure:
     rows = found.tables["training"]
     rows = rows[rows["use"] == "learned"].head(20)
     figure, axes = plans(rows[["x_m", "y_m"]].to_numpy())
@@ -57,7 +56,7 @@ def _positives(found: Findings, material: Material, settings: Settings) -> Figur
     """Confidence of a network that learned one view and one turned copy of it, at the grid place nearest to it:
     {one_place_error_deg:.2f} degrees off (thesis: 0.35).""",
 )  # fmt: skip
-def _one_place(found: Findings, material: Material, settings: Settings) -> Figure:
+def _one_place(found: Findings, material: Material) -> Figure:
     figure, axes = canvas(WIDE, 1, 2, width_ratios=(2, 1))
     table = found.tables["one_place"]
     row = table.iloc[0]
@@ -75,7 +74,7 @@ def _one_place(found: Findings, material: Material, settings: Settings) -> Figur
     """The classifier (left) and perfect memory (right) of the route's first 20 learned views. Median error of the classifier:
     {median_error_deg_first_20:.1f} degrees (thesis: about 4).""",
 )  # fmt: skip
-def _first_20(found: Findings, material: Material, settings: Settings) -> Figure:
+def _first_20(found: Findings, material: Material) -> Figure:
     return diagrams(
         found.tables,
         material.route,
@@ -89,7 +88,7 @@ def _first_20(found: Findings, material: Material, settings: Settings) -> Figure
     """The classifier (left) and perfect memory (right) of the same views. Median error of the classifier:
     {median_error_deg_whole_route:.1f} degrees (thesis: about 45).""",
 )  # fmt: skip
-def _whole_route(found: Findings, material: Material, settings: Settings) -> Figure:
+def _whole_route(found: Findings, material: Material) -> Figure:
     names = {"headings_whole_route": "classifier", "perfect_memory_whole_route": "perfect memory"}
     return diagrams(found.tables, material.route, material.world, names)
 
@@ -100,7 +99,7 @@ def _whole_route(found: Findings, material: Material, settings: Settings) -> Fig
     "The part looked at",
     "The two neighbouring corners that turn the most (red: corners; dark: the part looked at).",
 )
-def _section(found: Findings, material: Material, settings: Settings) -> Figure:
+def _section(found: Findings, material: Material) -> Figure:
     figure, axes = plans(material.route.xy)
     first, last = found.numbers["section_first_view"], found.numbers["section_last_view"]
     corners = found.tables["selections"]
@@ -117,7 +116,7 @@ def _section(found: Findings, material: Material, settings: Settings) -> Figure:
     """RMS difference between successive learned views along the route (line) and how much it turns there (red); the part looked at
     is shaded.""",
 )  # fmt: skip
-def _change(found: Findings, material: Material, settings: Settings) -> Figure:
+def _change(found: Findings, material: Material) -> Figure:
     figure, axes = canvas()
     axis, table = axes[0, 0], found.tables["change"]
     axis.plot(table["along_m"], table["rms"], "o-", ms=3, color=CURVE_COLOUR, lw=1.2)
@@ -137,7 +136,7 @@ def _change(found: Findings, material: Material, settings: Settings) -> Figure:
     "Twice as many views in the corners",
     "Views learned: one in six (blue), and one in three in the corners of the part looked at (red).",
 )
-def _more_views(found: Findings, material: Material, settings: Settings) -> Figure:
+def _more_views(found: Findings, material: Material) -> Figure:
     figure, axes = plans(material.route.xy)
     table = found.tables["selections"]
     plain, doubled = (name for name in table.columns[3:5])
@@ -151,7 +150,7 @@ def _more_views(found: Findings, material: Material, settings: Settings) -> Figu
     "32", "corners", "Before and after",
     "Headings beside the part looked at, having learned one view in six (left) and twice as many in its corners (right).",
 )  # fmt: skip
-def _before_and_after(found: Findings, material: Material, settings: Settings) -> Figure:
+def _before_and_after(found: Findings, material: Material) -> Figure:
     chosen = found.tables["selections"].columns[3:5]
     first = found.tables[f"headings, {chosen[0]}"]
     if int(first["in_section"].sum()) == 0:

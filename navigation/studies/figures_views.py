@@ -21,7 +21,6 @@ from .findings import Findings
 from .headings import RECOVERED_DEG
 from .material import Material
 from .pictures import picture
-from .settings import Settings
 
 
 @picture(
@@ -29,7 +28,7 @@ from .settings import Settings
     """The grid of {grid_views} places where views are taken (dots; the thesis has {grid_views_published}) and the route,
     {route_length_m:.1f} m long.""",
 )  # fmt: skip
-def _world(found: Findings, material: Material, settings: Settings) -> Figure:
+def _world(found: Findings, material: Material) -> Figure:
     figure, axes = plans(material.grid)
     axes[0, 0].plot(*material.grid.T, ".", color=PATH_COLOUR, ms=1.6, alpha=0.7)
     draw_route(axes[0, 0], material.route)
@@ -38,7 +37,7 @@ def _world(found: Findings, material: Material, settings: Settings) -> Figure:
 
 
 @picture("5", "setting", "A view", "What an eye sees at the middle of the route, facing along it: {panorama} pixels.")
-def _view(found: Findings, material: Material, settings: Settings) -> Figure:
+def _view(found: Findings, material: Material) -> Figure:
     figure, axes = canvas((7.2, 2.0))
     panorama(axes[0, 0], material.route_views[len(material.route_views) // 2])
     return figure
@@ -49,9 +48,11 @@ def _view(found: Findings, material: Material, settings: Settings) -> Figure:
     """Root-mean-square difference (grey levels) between one route view and views at the same place, nearby and far away, at every
     rotation. At the same place it is zero, nearby it has a distinct minimum, far away none to rely on.""",
 )  # fmt: skip
-def _idf(found: Findings, material: Material, settings: Settings) -> Figure:
+def _idf(found: Findings, material: Material) -> Figure:
     figure, axes = canvas(WIDE, 1, 3, sharey=True)
-    for axis, (name, curve) in zip(axes[0], found.tables["idf"].groupby("view", sort=False), strict=True):
+    curves = found.tables["idf"]
+    shown = curves[curves["reference"] == found.numbers["reference_shown"]]
+    for axis, (name, curve) in zip(axes[0], shown.groupby("view", sort=False), strict=True):
         around_circle(axis, curve["degrees_off"], curve["rms"])
         axis.set_title({"same": "the same place"}.get(str(name), f"{name}, {curve['distance_m'].iloc[0]:.2f} m away"))
         axis.set_ylim(bottom=0)
@@ -66,7 +67,7 @@ def _idf(found: Findings, material: Material, settings: Settings) -> Figure:
     """Headings recovered within 0.5 m of one route view (blue). The longer an arrow, the more alike the views; red ones are
     over 45 degrees off.""",
 )  # fmt: skip
-def _headings_around(found: Findings, material: Material, settings: Settings) -> Figure:
+def _headings_around(found: Findings, material: Material) -> Figure:
     around = found.tables["around"]
     table = around[around["reference"] == found.numbers["reference_shown"]]
     figure, axes = plans(table[["x_m", "y_m"]].to_numpy())
@@ -86,7 +87,7 @@ def _headings_around(found: Findings, material: Material, settings: Settings) ->
     deepest is not the right one. {share_of_failures_with_several_minima:.0%} of the failures around the reference views have
     several minima.""",
 )  # fmt: skip
-def _ambiguous(found: Findings, material: Material, settings: Settings) -> Figure:
+def _ambiguous(found: Findings, material: Material) -> Figure:
     table = found.tables["ambiguous"]
     figure, axes = canvas(WIDE, 1, 2, sharey=True)
     if not len(table):
@@ -106,7 +107,7 @@ def _ambiguous(found: Findings, material: Material, settings: Settings) -> Figur
     "10", "visual-compass", "A place behind something",
     "The failed place whose view is covered the most: what it sees, what the route view sees, and the image difference between the two.",
 )  # fmt: skip
-def _occluded(found: Findings, material: Material, settings: Settings) -> Figure:
+def _occluded(found: Findings, material: Material) -> Figure:
     table = found.tables["occluded"]
     if not len(table):
         return nothing("no heading failed here")
@@ -129,7 +130,7 @@ def _occluded(found: Findings, material: Material, settings: Settings) -> Figure
     "11", "visual-compass", "Error against distance",
     "Heading errors around three reference views (dots) and the median over all twelve (line), in rings of 0.1 m.",
 )  # fmt: skip
-def _error_by_distance(found: Findings, material: Material, settings: Settings) -> Figure:
+def _error_by_distance(found: Findings, material: Material) -> Figure:
     figure, axes = canvas()
     axis, around, rings = axes[0, 0], found.tables["around"], found.tables["by_distance"]
     references = around["reference"].unique()

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from world.geometry import turn_of_columns, wrap_angle
+
 from ..evaluation import BATCH, errors_on
 from ..familiarity import FamiliarityModel, Images
 from .material import Material
@@ -30,6 +32,12 @@ def headings(
         "set_heading_deg": np.degrees(material.wanted[rows]), "heading_deg": np.degrees(found.headings),
         "error_deg": np.degrees(found.errors),
     })  # fmt: skip
+
+
+def around_set_heading(values: np.ndarray, facing: float, set_heading: float, *, name: str) -> pd.DataFrame:
+    """What a scan gave at every rotation of a view, in degrees to the left of the set heading. facing, set_heading: rad."""
+    off = np.degrees(wrap_angle(turn_of_columns(np.arange(len(values)), len(values)) + (facing - set_heading)))
+    return pd.DataFrame({"degrees_off": off, name: values}).sort_values("degrees_off", kind="stable", ignore_index=True)
 
 
 def errors_of(table: pd.DataFrame) -> dict[str, float]:

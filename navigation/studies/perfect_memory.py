@@ -10,7 +10,7 @@ from . import published
 from .findings import Claim, Findings
 from .headings import box_of, errors_of, headings
 from .material import Material
-from .settings import Settings
+from .settings import ENCODING, SMOOTHING, Settings
 
 FREQUENCIES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 25, 30)
 RESIZING = {"sampled": "sample", "averaged": "resize"}  # as the thesis does it, and as it is better done
@@ -18,7 +18,7 @@ RESIZING = {"sampled": "sample", "averaged": "resize"}  # as the thesis does it,
 
 def frequency(material: Material, settings: Settings, progress=lambda done, total: None) -> Findings:
     """Figures 12 to 15 and appendix 7.2: headings along the route when one view in so many is remembered."""
-    encoding = settings.encoding if settings.quick else Encoding.parse("grey")
+    encoding = ENCODING if settings.quick else Encoding.parse("grey")
     views, places = encoding(material.route_views), encoding(material.place_views)
     frequencies = [every for every in FREQUENCIES if every < len(views) / 4]
     rows, boxes, first = [], [], None
@@ -82,7 +82,7 @@ def resolution(material: Material, settings: Settings, progress=lambda done, tot
     runs = [(way, smoothed, factor) for way in RESIZING for smoothed in (False, True) for factor in factors]
     rows, boxes, unresized = [], [], {}
     for done, (way, smoothed, factor) in enumerate(runs):
-        blur = f"blur {settings.smoothing:g} | " if smoothed else ""
+        blur = f"blur {SMOOTHING:g} | " if smoothed else ""
         encoding = Encoding.parse(f"grey | {blur}{RESIZING[way]} {factor}")
         table = unresized.get(smoothed) if factor == 1 else None  # factor 1 leaves views as they are, whichever way
         if table is None:
@@ -97,7 +97,7 @@ def resolution(material: Material, settings: Settings, progress=lambda done, tot
     by_factor = _beside_published(pd.DataFrame(boxes))
     return Findings(
         tables={"errors": pd.concat(rows, ignore_index=True), "by_factor": by_factor},
-        numbers={"smoothing_px": settings.smoothing},
+        numbers={"smoothing_px": SMOOTHING},
         claims=[_flat_then_rises(by_factor), _smoothing_helps(by_factor), _best_factor(by_factor)],
     )
 

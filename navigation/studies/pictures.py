@@ -7,9 +7,8 @@ from matplotlib.figure import Figure
 
 from .findings import Findings
 from .material import Material
-from .settings import Settings
 
-Draw = Callable[[Findings, Material, Settings], Figure]
+Draw = Callable[[Findings, Material], Figure]
 
 
 @dataclass(frozen=True, kw_only=True)

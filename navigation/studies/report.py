@@ -21,7 +21,6 @@ from . import published
 from .figures import PICTURES, Picture
 from .findings import Claim, Findings, plain
 from .material import Material
-from .settings import Settings
 from .tables import LISTINGS, Listing, cell
 from .thesis import STUDIES
 
@@ -92,7 +91,7 @@ def check_report_folder(out: Path, about: dict[str, Any], *, overwrite: bool = F
 
 
 def write_report(
-    out: Path, runs: Runs, material: Material, settings: Settings, *, about: dict[str, Any], command: str, title: str,
+    out: Path, runs: Runs, material: Material, *, about: dict[str, Any], command: str, title: str,
     only: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Write figures (PNG and SVG), results.json and report.html; figures and tables are of the first seed.
@@ -107,7 +106,7 @@ def write_report(
     results = _results(runs, judged, about)
     parts = [
         {"name": name, "title": STUDIES[name].title, "exhibits": [
-            _exhibit(each, first[name], material, settings, out / FIGURES, judged, command) for each in exhibits if each.study == name
+            _exhibit(each, first[name], material, out / FIGURES, judged, command) for each in exhibits if each.study == name
         ]} for name in first
     ]  # fmt: skip
     page = _page(parts, judged if only is None else [], runs, about, title)
@@ -140,7 +139,7 @@ def _name(exhibit: Picture | Listing) -> str:
 
 
 def _exhibit(
-    each: Picture | Listing, findings: Findings, material: Material, settings: Settings, folder: Path, judged: list[Verdict], command: str,
+    each: Picture | Listing, findings: Findings, material: Material, folder: Path, judged: list[Verdict], command: str,
 ) -> dict[str, Any]:  # fmt: skip
     """What the page shows of a figure or table."""
     thesis = each.number[0].isdigit()
@@ -150,11 +149,7 @@ def _exhibit(
         "claims": [_shown(verdict) for verdict in judged if _exhibit_of(verdict) is each],
     }  # fmt: skip
     if isinstance(each, Picture):
-        return (
-            shown
-            | {"caption": each.caption.format(**findings.numbers)}
-            | _draw(each, findings, material, settings, folder)
-        )
+        return shown | {"caption": each.caption.format(**findings.numbers)} | _draw(each, findings, material, folder)
     rows = each.rows(findings)
     columns = [column.rstrip() for column in rows.columns]
     return shown | {
@@ -168,9 +163,9 @@ def _exhibit_of(verdict: Verdict) -> Picture | Listing:
     return next(each for each in (*PICTURES, *LISTINGS) if verdict.claim.figure in _numbers(each))
 
 
-def _draw(each: Picture, findings: Findings, material: Material, settings: Settings, folder: Path) -> dict[str, Any]:
+def _draw(each: Picture, findings: Findings, material: Material, folder: Path) -> dict[str, Any]:
     """Draw a figure into its files; give the PNG for the page."""
-    figure = each.draw(findings, material, settings)
+    figure = each.draw(findings, material)
     data = io.BytesIO()
     figure.savefig(data, dpi=DPI, format="png")
     with replacing(folder / f"{_name(each)}.png") as partial:

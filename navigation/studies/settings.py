@@ -4,27 +4,22 @@ from dataclasses import dataclass
 
 from ..encoding import Encoding
 
+EVERY = 6  # one route view in so many is learned (4.3.3)
+FACTOR = 6  # of resizing (4.3.4)
+SMOOTHING = 1.1  # standard deviation of the Gaussian (pixels of the view), that of OpenCV's 5 x 5 kernel; the thesis does not say
+ENCODING = Encoding.parse(f"grey | blur {SMOOTHING:g} | sample {FACTOR}")  # sampled as cv2.resize does (4.4.1)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """Choices of the whole replication; `quick` is for tests and first looks.
 
     seed: of the networks. starts: networks trained from different random starts for each number, of which the median counts.
-    every: one route view in so many is learned (4.3.3). factor: of resizing (4.3.4). smoothing: standard deviation of the Gaussian
-    (pixels of the view), that of OpenCV's 5 x 5 kernel; the thesis does not say.
     iterations: short and long training (4.4.7.1). search_iterations: of the grid search, scikit-learn's default at the time.
     """
 
     seed: int = 0
     quick: bool = False
-    every: int = 6
-    factor: int = 6
-    smoothing: float = 1.1
-
-    @property
-    def encoding(self) -> Encoding:
-        """The thesis's preprocessing: grey, smoothed, resized by sampling as cv2.resize does (4.4.1)."""
-        return Encoding.parse(f"grey | blur {self.smoothing:g} | sample {self.factor}")
 
     @property
     def starts(self) -> int:

@@ -5,13 +5,13 @@ import pandas as pd
 from scipy.signal import find_peaks
 from scipy.stats import spearmanr
 
-from world.geometry import turn_of_columns, wrap_angle
+from world.geometry import wrap_angle
 
 from ..encoding import Encoding
 from ..models import make_model
 from ..rotation import best_turn
 from .findings import Claim, Findings
-from .headings import RECOVERED_DEG
+from .headings import RECOVERED_DEG, around_set_heading
 from .material import Material
 from .settings import Settings
 
@@ -34,8 +34,7 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
         curves[int(reference)] = idf
         progress(done + 1, len(references))
     around = pd.concat(rows, ignore_index=True)
-    shown = _typical(around)
-    three = _three_curves(material, shown, places)
+    three = pd.concat([_three_curves(material, reference, places) for reference in curves], ignore_index=True)
     return Findings(
         tables={
             "around": around,
@@ -44,7 +43,7 @@ def study(material: Material, settings: Settings, progress=lambda done, total: N
             "ambiguous": _ambiguous(around, curves),
             "occluded": _occluded(material, around, curves),
         },
-        numbers={"reference_shown": shown} | _examples(around),
+        numbers={"reference_shown": _typical(around)} | _examples(around),
         claims=_claims(around, three),
     )
 
@@ -81,19 +80,8 @@ def _typical(around: pd.DataFrame) -> int:
     return int(share.sort_values(kind="stable").index[len(share) // 2])
 
 
-def _degrees_off(width: int, facing_deg: float, set_heading_deg: float) -> np.ndarray:
-    """Each rotation of a view as degrees to the left of a set heading."""
-    turns = turn_of_columns(np.arange(width), width)
-    return np.degrees(wrap_angle(turns + np.radians(facing_deg - set_heading_deg)))
-
-
-def _curve(idf: np.ndarray, facing_deg: float, set_heading_deg: float) -> pd.DataFrame:
-    off = _degrees_off(len(idf), facing_deg, set_heading_deg)
-    return pd.DataFrame({"degrees_off": off, "rms": idf}).sort_values("degrees_off", kind="stable", ignore_index=True)
-
-
 def _three_curves(material: Material, reference: int, places) -> pd.DataFrame:
-    """IDFs of the same view, of the nearest place's and of the farthest place's (figure 6)."""
+    """IDFs of the same view, of the nearest place's and of the farthest place's (figure 6), against one route view."""
     pose = material.route.poses[reference]
     distance = np.hypot(*(material.places[:, :2] - pose[:2]).T)
     snapshot = RAW(material.route_views[reference : reference + 1])
@@ -104,15 +92,16 @@ def _three_curves(material: Material, reference: int, places) -> pd.DataFrame:
     curves = []
     for name, (image, at, away) in seen.items():
         idf = -LEVELS * compass.scan(image).numpy()[0]
-        curve = _curve(idf, np.degrees(at[2]), np.degrees(pose[2]))
-        curves.append(curve.assign(view=name, distance_m=away))
+        curve = around_set_heading(idf, at[2], pose[2], name="rms")
+        curves.append(curve.assign(reference=reference, view=name, distance_m=away))
     return pd.concat(curves, ignore_index=True)
 
 
 def _pick(table: pd.DataFrame, curves: dict[int, dict[int, np.ndarray]], index: int, view: str) -> pd.DataFrame:
     """The curve of one row of `around`, with where it is."""
     row = table.loc[index]
-    curve = _curve(curves[int(row["reference"])][int(row["place"])], row["facing_deg"], row["set_heading_deg"])
+    idf = curves[int(row["reference"])][int(row["place"])]
+    curve = around_set_heading(idf, np.radians(row["facing_deg"]), np.radians(row["set_heading_deg"]), name="rms")
     where = {name: row[name] for name in ("reference", "place", "x_m", "y_m", "distance_m", "error_deg", "minima")}
     return curve.assign(view=view, **where)
 
@@ -169,7 +158,8 @@ def _claims(around: pd.DataFrame, curves: pd.DataFrame) -> list[Claim]:
     rank = spearmanr(around["distance_m"], around["error_deg"])
     rings = _by_distance(around)
     shares = _examples(around)
-    lowest = curves.groupby("view")["rms"].min()
+    lowest = curves.groupby(["reference", "view"])["rms"].min().unstack()
+    middle = lowest.median()
     return [
         Claim(
             key="idf-minimum",
@@ -177,12 +167,13 @@ def _claims(around: pd.DataFrame, curves: pd.DataFrame) -> list[Claim]:
             statement="The image difference has a minimum of zero at the same place, a higher one nearby, and a higher one still far away.",
             published={"lowest RMS at the same place": 0.0},
             obtained={
-                "lowest RMS at the same place": float(lowest["same"]),
-                "nearby": float(lowest["near"]),
-                "far away": float(lowest["far"]),
+                "lowest RMS at the same place": float(middle["same"]),
+                "nearby": float(middle["near"]),
+                "far away": float(middle["far"]),
             },
-            test="the lowest RMS difference (grey levels) is 0 at the same place, and lower nearby than far away",
-            holds=bool(lowest["same"] < 1e-3 and lowest["same"] < lowest["near"] < lowest["far"]),
+            test="the lowest RMS difference (grey levels, median over twelve route views) is 0 at the same place for all of them, "
+            "and lower nearby than far away for eleven or more",
+            holds=bool((lowest["same"] < 1e-3).all() and (lowest["near"] >= lowest["far"]).sum() <= 1),
         ),
         Claim(
             key="visual-compass-near",
