@@ -1,5 +1,6 @@
 """The CPU renderer against Embree (an independent ray caster), against another program's pictures, and against its own laws."""
 
+import dataclasses
 import json
 
 import cv2
@@ -11,6 +12,7 @@ from scenes import random_poses, random_world, world_of
 from render.eye import Eye
 from render.renderer import open_renderer
 from render.scanline import ScanlineRenderer
+from render.tree import LEAF, TriangleTree
 from world.errors import InputError
 from world.files import read_world
 from world.geometry import column_azimuths
@@ -185,3 +187,44 @@ def test_eyes_that_see_nothing_are_refused(eye, message):
 def test_an_unknown_renderer_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match="cpu, egl, osmesa"):
         open_renderer(random_world(), Eye(), "vulkan")
+
+
+@pytest.mark.parametrize("name", ["tussock-field", "tiny", "a wall", "random"])
+def test_what_the_tree_leaves_out_changes_no_byte(name):
+    """Against the same renderer with boxes so large that none is ever between the rays, or hidden."""
+    if name == "a wall":  # in front of a crowd, most of which it hides
+        wall = np.array([[(1, -9, 0), (1, 9, 0), (1, 9, 3)], [(1, -9, 0), (1, 9, 3), (1, -9, 3)]], dtype=np.float32)
+        crowd = random_world(seed=2, n=3000)
+        world = World(**{**vars(crowd), "triangles": np.concatenate([wall, crowd.triangles]), "ground": None,
+                         "rgb": np.concatenate([np.zeros((2, 3), np.uint8), crowd.rgb])})  # fmt: skip
+    else:
+        world = random_world(seed=5, n=2000) if name == "random" else World.generate(name, seed=3)
+    rng = np.random.default_rng(1)
+    x0, y0, x1, y1 = world.field
+    poses = np.column_stack([rng.uniform(x0, x1, 6), rng.uniform(y0, y1, 6), rng.uniform(-3, 3, 6)])
+    for eye in (Eye(), Eye(width=90, height=25, samples=4, top=np.radians(90), bottom=np.radians(-90), z=0.2)):
+        with ScanlineRenderer(world, eye) as renderer, ScanlineRenderer(world, eye) as plain:
+            boxes = np.full_like(plain._tree.boxes, 1e6)
+            boxes[:, :3] = -1e6
+            plain._tree = dataclasses.replace(plain._tree, boxes=boxes)
+            assert np.array_equal(renderer.render(poses), plain.render(poses))
+
+
+def test_every_box_of_the_tree_holds_its_triangles_and_its_parts():
+    world = random_world(seed=4, n=1000)
+    triangles, _ = world.surfaces()
+    tree = TriangleTree.of(triangles)
+    assert sorted(tree.order) == list(range(len(triangles)))
+    assert np.array_equal(tree.corners, triangles[tree.order].transpose(2, 1, 0))
+    leaves = len(tree.boxes) // 2
+    for k, (*low, x1, y1, z1) in enumerate(tree.boxes):
+        if k >= leaves:
+            inside = tree.corners[..., (k - leaves) * LEAF : (k - leaves + 1) * LEAF].reshape(3, -1)
+        elif k >= 1:
+            inside = np.hstack([tree.boxes[2 * k : 2 * k + 2, :3].T, tree.boxes[2 * k : 2 * k + 2, 3:].T])
+            inside = inside[:, np.isfinite(inside).all(axis=0)]
+        else:
+            continue
+        if inside.size:
+            assert (inside.min(axis=1) >= low).all()
+            assert (inside.max(axis=1) <= (x1, y1, z1)).all()

@@ -1,0 +1,51 @@
+"""The triangles of a world sorted in space, under a tree of boxes that lets a renderer leave out many of them at once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Float32, Int64, UInt64
+
+LEAF = 32  # triangles in a box of the lowest level; of 16 to 64 the quickest
+
+
+@dataclass(frozen=True, kw_only=True)
+class TriangleTree:
+    """A binary tree without pointers: box k holds boxes 2 k and 2 k + 1; the box of all is 1, the lowest are the last half.
+
+    Box `len(boxes) // 2 + i` holds the triangles i LEAF to (i + 1) LEAF - 1. About 44 bytes a triangle.
+
+    order: place of each triangle in the world it was made of. corners: x, y, z of the three corners (m).
+    boxes: least and greatest x, y, z (m); inf and -inf where a box is empty.
+    """
+
+    order: Int64[np.ndarray, " n"]
+    corners: Float32[np.ndarray, "3 3 n"]
+    boxes: Float32[np.ndarray, "m 6"]
+
+    @classmethod
+    def of(cls, triangles: Float32[np.ndarray, "n 3 3"]) -> "TriangleTree":
+        """The tree of triangles: neighbours along a Z-curve over the ground share a box."""
+        order = np.argsort(_along_z_curve(triangles[:, :, :2].mean(axis=1, dtype=float)), kind="stable")
+        corners = np.ascontiguousarray(triangles[order].transpose(2, 1, 0))
+        starts = np.arange(0, len(order), LEAF)
+        leaves = 1 << max(0, len(starts) - 1).bit_length()
+        boxes = np.tile(np.repeat(np.array([np.inf, -np.inf], dtype=np.float32), 3), (2 * leaves, 1))
+        if len(starts):
+            boxes[leaves : leaves + len(starts), :3] = np.minimum.reduceat(corners.min(axis=1), starts, axis=1).T
+            boxes[leaves : leaves + len(starts), 3:] = np.maximum.reduceat(corners.max(axis=1), starts, axis=1).T
+        while leaves > 1:
+            below = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
+            leaves //= 2
+            boxes[leaves : 2 * leaves] = np.hstack([below[:, :, :3].min(axis=1), below[:, :, 3:].max(axis=1)])
+        return cls(order=order, corners=corners, boxes=boxes)
+
+
+def _along_z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:
+    """How far along a Z-curve points lie: the bits of x and y, 16 of each, in turn."""
+    if len(points) == 0:
+        return np.empty(0, dtype=np.uint64)
+    low = points.min(axis=0)
+    cells = ((points - low) * (65535 / max(np.ptp(points, axis=0).max(), 1e-300))).astype(np.uint64)
+    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+        cells = (cells | cells << np.uint64(shift)) & np.uint64(mask)
+    return cells[:, 0] | cells[:, 1] << np.uint64(1)
