@@ -1,18 +1,18 @@
 """The loop: look, scan, turn to the most familiar heading, step."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from render.renderer import Renderer
 from world.errors import InputError
 from world.geometry import Pose, Route, columns_of_turn, wrap_angle
 
 from .encoding import Encoding
-from .familiarity import FamiliarityModel, Following, SequenceModel, SnapshotModel
+from .familiarity import FamiliarityModel, SequenceModel, SnapshotModel
 from .rotation import best_turn, scan_window
 
 # Why a walk ends. The first is success.
@@ -111,54 +111,65 @@ class Agent:
 
     def walk(self, start: Pose) -> Iterator[Step]:
         """Walk from `start` until arrival or failure, a `Step` at a time; the last one has a `reason`."""
-        self._check_inside(start)
-        random = np.random.default_rng(self.seed)
-        pose, reset, furthest, gained_at = start, None, -np.inf, 0
-        been_away = self._from_goal(self.route.start) > self.arrive  # else the route ends where it starts
-        following = self.model.follow() if isinstance(self.model, SequenceModel) else None
+        for (step,) in self.walk_many([start]):
+            assert step is not None
+            yield step
+
+    def walk_many(self, starts: Sequence[Pose]) -> Iterator[list[Step | None]]:
+        """Walk from each start, all side by side: at a time a list of one `Step` a start, None where that walk has ended.
+
+        What they see is drawn, encoded and scanned together, which takes a fraction of the time. Walk k draws its noise from
+        `seed` + k and takes the steps that it takes alone with that seed (but for rounding, where the model keeps no views).
+        """
+        for start in starts:
+            self._check_inside(start)
+        walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
         for index in range(self.step_limit + 1):
-            view = self.renderer.render([pose])[0]
-            features = self.encoding(view[None])
-            window = self._window(features.shape[2], pose)
-            familiarity, match = self._scan(features, window, following)
-            turn = match_turn = float(best_turn(familiarity[None], window)[0])
-            turn = float(wrap_angle(turn + self.heading_noise * random.standard_normal()))
-            (deviation,), (along,) = self.route.nearest(np.array([pose[:2]]))
-            if along > furthest:
-                furthest, gained_at = float(along), index
-            been_away = been_away or self._from_goal(pose) > self.arrive
-            reason = self._reason(index, pose, deviation, index - gained_at, been_away)
-            recovering = self.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < self.step_limit
-            yield Step(
-                index=index, pose=pose, view=view, familiarity=familiarity, turn=turn,
-                match=None if match is None else int(match[round(columns_of_turn(match_turn, len(match))) % len(match)]),
-                place=None if following is None else following.place,
-                deviation=float(deviation), along=float(along), reset=reset, reason=None if recovering else reason,
-                error=float(wrap_angle(pose.heading + turn - self.route.at(along)[0, 2])),
-            )  # fmt: skip
-            if recovering:
-                furthest = self._waypoint_after(furthest)
-                pose, reset, gained_at = Pose(*self.route.at(furthest)[0].tolist()), reason, index
-            elif reason:
+            going = [k for k, walk in enumerate(walks) if not walk.ended]
+            if not going:
                 return
-            else:
-                pose, reset = pose.turned(turn).moved(self.step_length), None
+            steps: list[Step | None] = [None] * len(walks)
+            for k, step in zip(going, self._steps(index, [walks[k] for k in going]), strict=True):
+                steps[k] = step
+            yield steps
+
+    def _steps(self, index: int, walks: "list[_Walk]") -> Iterator[Step]:
+        """The next step of each of several walks."""
+        poses = np.array([walk.pose for walk in walks])
+        views = self.renderer.render(poses)
+        features = self.encoding(views)
+        width = features.shape[2]
+        windows = self._windows(width, poses[:, 2])
+        familiarity, match = self._scan(features, windows, walks)
+        turns = best_turn(familiarity, windows)
+        deviation, along = self.route.nearest(poses[:, :2])
+        towards = self.route.at(along)[:, 2]
+        columns = np.rint(columns_of_turn(turns, width)).astype(int) % width
+        for k, walk in enumerate(walks):
+            yield walk.step(
+                index, views[k], familiarity[k], turn=float(turns[k]), match=None if match is None else int(match[k, columns[k]]),
+                deviation=float(deviation[k]), along=float(along[k]), towards=float(towards[k]),
+            )  # fmt: skip
 
     def _scan(
-        self, features: torch.Tensor, window: np.ndarray, following: Following | None
+        self, features: torch.Tensor, windows: np.ndarray, walks: "list[_Walk]"
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Familiarity of every rotation of a view, and which learned view each resembles, if the model knows."""
-        if following is not None:
-            familiarity, match = following.look(features[0], window)
-            return familiarity.cpu().numpy(), match.cpu().numpy()
-        if isinstance(self.model, SnapshotModel):
+        """Familiarity of every rotation of each view, and which learned view each resembles, if the model knows."""
+        followings = [walk.following for walk in walks if walk.following is not None]
+        if followings:
+            looks = [each.look(view, window) for each, view, window in zip(followings, features, windows, strict=True)]
+            familiarity, match = (torch.stack(each) for each in zip(*looks, strict=True))
+        elif isinstance(self.model, SnapshotModel):
             familiarity, match = self.model.match(features)
-            return familiarity[0].cpu().numpy(), match[0].cpu().numpy()
-        return self.model.scan(features)[0].cpu().numpy(), None
+        else:
+            return self.model.scan(features).cpu().numpy(), None
+        return familiarity.cpu().numpy(), match.cpu().numpy()
 
-    def _window(self, width: int, pose: Pose) -> np.ndarray:
-        centre = 0.0 if self.scan_about is None else float(wrap_angle(self.scan_about - pose.heading))
-        return scan_window(width, self.scan, centre)
+    def _windows(self, width: int, headings: Float[np.ndarray, " n"]) -> Bool[np.ndarray, "n w"]:
+        """Which rotations agents that face `headings` look at."""
+        if self.scan_about is None:
+            return np.tile(scan_window(width, self.scan), (len(headings), 1))
+        return np.stack([scan_window(width, self.scan, float(wrap_angle(self.scan_about - each))) for each in headings])
 
     def _from_goal(self, pose: Pose) -> float:
         """Distance from the route's end (m)."""
@@ -186,3 +197,43 @@ class Agent:
             raise InputError(
                 f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
             )
+
+
+class _Walk:
+    """Where one walk of an agent has come to."""
+
+    def __init__(self, agent: Agent, start: Pose, seed: int):
+        self.agent, self.pose = agent, start
+        self.random = np.random.default_rng(seed)
+        self.following = agent.model.follow() if isinstance(agent.model, SequenceModel) else None
+        self.furthest, self.gained_at = -np.inf, 0
+        self.been_away = agent._from_goal(agent.route.start) > agent.arrive  # else the route ends where it starts
+        self.reset: str | None = None
+        self.ended = False
+
+    def step(
+        self, index: int, view: np.ndarray, familiarity: np.ndarray, *, turn: float, match: int | None, deviation: float, along: float,
+        towards: float,
+    ) -> Step:  # fmt: skip
+        """The step that follows from a look, taken. turn: to the most familiar heading; towards: the route's heading here (rad)."""
+        agent, pose = self.agent, self.pose
+        turn = float(wrap_angle(turn + agent.heading_noise * self.random.standard_normal()))
+        if along > self.furthest:
+            self.furthest, self.gained_at = along, index
+        self.been_away = self.been_away or agent._from_goal(pose) > agent.arrive
+        reason = agent._reason(index, pose, deviation, index - self.gained_at, self.been_away)
+        recovering = agent.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < agent.step_limit
+        step = Step(
+            index=index, pose=pose, view=view, familiarity=familiarity, turn=turn, match=match,
+            place=None if self.following is None else self.following.place,
+            deviation=deviation, along=along, error=float(wrap_angle(pose.heading + turn - towards)),
+            reset=self.reset, reason=None if recovering else reason,
+        )  # fmt: skip
+        if recovering:
+            self.furthest, self.gained_at = agent._waypoint_after(self.furthest), index
+            self.pose, self.reset = Pose(*agent.route.at(self.furthest)[0].tolist()), reason
+        elif reason:
+            self.ended = True
+        else:
+            self.pose, self.reset = pose.turned(turn).moved(agent.step_length), None
+        return step

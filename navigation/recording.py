@@ -10,7 +10,7 @@ import socket
 import subprocess
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from jaxtyping import Float
+from jaxtyping import Float, Int64, UInt8
 from rerun.experimental import ViewerClient
 
 from render.renderer import Renderer
@@ -50,6 +50,7 @@ class Recording:
         training_poses: Float[np.ndarray, "n 3"] | None = None, lost: float = 0.5, live: str | None = None, title: str = "",
     ):  # fmt: skip
         self._renderer, self._training_poses = renderer, training_poses
+        self._waiting: list[Step] = []
         self._previous: Step | None = None
         self._streams = [rr.RecordingStream("tussock")]
         blueprint = _blueprint(route, lost)
@@ -62,39 +63,8 @@ class Recording:
         self._flush()
 
     def log(self, step: Step) -> None:
-        """Add one step."""
-        pose = step.pose
-        for stream in self._streams:
-            stream.set_time(TIMELINE, sequence=step.index)
-        here = [pose.x, pose.y, ABOVE]
-        self._log(
-            "world/agent",
-            rr.Arrows3D(
-                origins=[here], vectors=[_direction(pose.heading + step.turn, 0.2)], colors=PATH_COLOUR, radii=0.012
-            ),
-        )
-        if self._previous is not None and step.reset is None:
-            before = self._previous.pose
-            self._log(
-                "world/path", rr.LineStrips3D([[[before.x, before.y, ABOVE], here]], colors=PATH_COLOUR, radii=0.008)
-            )
-        self._log("view", rr.Image(step.view[..., :3]))
-        self._log_match(step)
-        width = len(step.familiarity)
-        order = np.argsort(-turn_of_columns(np.arange(width), width))
-        degrees_right = -np.degrees(turn_of_columns(order, width))
-        # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
-        self._log(
-            "familiarity",
-            rr.BarChart(step.familiarity[order] - step.familiarity.min(), abscissa=degrees_right, color=MATCH_COLOUR),
-        )
-        self._log("deviation/m", rr.Scalars(step.deviation))
-        self._log("error/degrees", rr.Scalars(np.degrees(step.error)))
-        event = step.reason or (step.reset and f"{step.reset}: put back on the route")
-        if event:
-            level = rr.TextLogLevel.INFO if step.reason == ARRIVED else rr.TextLogLevel.WARN
-            self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
-        self._previous = step
+        """Add one step. Steps are written together, those of FLUSH_SECONDS at a time."""
+        self._waiting.append(step)
         if time.monotonic() - self._flushed > FLUSH_SECONDS:
             self._flush()
 
@@ -104,12 +74,51 @@ class Recording:
         for stream in self._streams:
             stream.disconnect()
 
-    def _log(self, entity: str, what: rr.AsComponents, *, static: bool = False) -> None:
+    def _log(
+        self, entity: str, what: rr.AsComponents | Iterable[rr.DescribedComponentBatch], *, static: bool = False
+    ) -> None:
         for stream in self._streams:
             stream.log(entity, what, static=static)
 
+    def _send(self, entity: str, steps: list[Step], columns: Iterable[rr.ComponentColumn]) -> None:
+        """Log an entity at several steps at once."""
+        if steps:
+            when = rr.TimeColumn(TIMELINE, sequence=[step.index for step in steps])
+            for stream in self._streams:
+                stream.send_columns(entity, [when], columns)
+
+    def _send_steps(self, steps: list[Step]) -> None:
+        """Log what changes from step to step, and the first time what of it does not."""
+        if self._previous is None:
+            self._log_constants(steps[0])
+        here = np.array([(*step.pose[:2], ABOVE) for step in steps])
+        facing = _directions(np.array([step.pose.heading + step.turn for step in steps]), 0.2)
+        self._send("world/agent", steps, rr.Arrows3D.columns(origins=here, vectors=facing))
+        before = [self._previous or steps[0], *steps[:-1]]
+        walked = [k for k, step in enumerate(steps) if before[k] is not step and step.reset is None]
+        ways = [[(*before[k].pose[:2], ABOVE), here[k]] for k in walked]
+        self._send("world/path", [steps[k] for k in walked], rr.LineStrips3D.columns(strips=ways))
+        self._send("view", steps, _images(np.stack([step.view for step in steps])))
+        self._send_matches([step for step in steps if step.match is not None])
+        self._send("deviation/m", steps, rr.Scalars.columns(scalars=[step.deviation for step in steps]))
+        self._send("error/degrees", steps, rr.Scalars.columns(scalars=np.degrees([step.error for step in steps])))
+        for step in steps:
+            for stream in self._streams:
+                stream.set_time(TIMELINE, sequence=step.index)
+            # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
+            values = step.familiarity[_rightwards(len(step.familiarity))] - step.familiarity.min()
+            self._log("familiarity", rr.BarChart(values))
+            event = step.reason or (step.reset and f"{step.reset}: put back on the route")
+            if event:
+                level = rr.TextLogLevel.INFO if step.reason == ARRIVED else rr.TextLogLevel.WARN
+                self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
+        self._previous = steps[-1]
+
     def _flush(self) -> None:
         """Bring what was logged to disk; rerun by itself holds small things back until there are megabytes of them."""
+        steps, self._waiting = self._waiting, []
+        if steps:
+            self._send_steps(steps)
         file, *viewers = self._streams
         file.flush()
         for viewer in viewers:
@@ -152,16 +161,35 @@ class Recording:
         if title:
             log("about", rr.TextDocument(title, media_type="text/markdown"), static=True)
 
-    def _log_match(self, step: Step) -> None:
-        """The learned view that was recognised, and where it was learned."""
-        if step.match is None or self._training_poses is None or self._renderer is None:
-            return
-        x, y, heading = self._training_poses[step.match]
-        self._log("recognised", rr.Image(self._renderer.render(self._training_poses[[step.match]])[0, ..., :3]))
-        arrow = rr.Arrows3D(
-            origins=[[x, y, ABOVE]], vectors=[_direction(heading, 0.15)], colors=MATCH_COLOUR, radii=0.008
+    def _log_constants(self, step: Step) -> None:
+        """What steps do not change of what they log."""
+        height, columns, _ = step.view.shape
+        width = len(step.familiarity)
+        form = rr.components.ImageFormat(width=columns, height=height, color_model="RGB", channel_datatype="U8")
+        self._log("world/agent", rr.Arrows3D.from_fields(colors=PATH_COLOUR, radii=0.012), static=True)
+        self._log("world/path", rr.LineStrips3D.from_fields(colors=PATH_COLOUR, radii=0.008), static=True)
+        self._log("view", rr.Image.from_fields(format=form), static=True)
+        if step.match is not None:
+            self._log("recognised", rr.Image.from_fields(format=form), static=True)
+            self._log("world/recognised", rr.Arrows3D.from_fields(colors=MATCH_COLOUR, radii=0.008), static=True)
+        degrees_right = -np.degrees(turn_of_columns(_rightwards(width), width))
+        chart = rr.BarChart(step.familiarity, abscissa=degrees_right, color=MATCH_COLOUR).as_component_batches()
+        self._log(
+            "familiarity",
+            [batch for batch in chart if batch.component_descriptor().component != "BarChart:values"],
+            static=True,
         )
-        self._log("world/recognised", arrow)
+
+    def _send_matches(self, steps: list[Step]) -> None:
+        """The learned views that were recognised, and where they were learned."""
+        if not steps or self._training_poses is None or self._renderer is None:
+            return
+        poses = self._training_poses[np.array([step.match for step in steps])]
+        self._send("recognised", steps, _images(self._renderer.render(poses)))
+        origins = np.column_stack([poses[:, :2], np.full(len(poses), ABOVE)])
+        self._send(
+            "world/recognised", steps, rr.Arrows3D.columns(origins=origins, vectors=_directions(poses[:, 2], 0.15))
+        )
 
 
 def check_viewer(url: str) -> None:
@@ -233,8 +261,18 @@ def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
                 viewer.kill()
 
 
-def _direction(heading: float, length: float) -> list[float]:
-    return [length * np.cos(heading), length * np.sin(heading), 0.0]
+def _directions(headings: Float[np.ndarray, " n"], length: float) -> Float[np.ndarray, "n 3"]:
+    return length * np.column_stack([np.cos(headings), np.sin(headings), np.zeros(len(headings))])
+
+
+def _images(views: UInt8[np.ndarray, "n height width channels"]) -> Iterable[rr.ComponentColumn]:
+    """Images as a column; their format is logged once (`_log_constants`)."""
+    return rr.Image.columns(buffer=views[..., :3].reshape(len(views), -1))
+
+
+def _rightwards(width: int) -> Int64[np.ndarray, " width"]:
+    """Rotations in the order of the headings they look to, from left to right."""
+    return np.argsort(-turn_of_columns(np.arange(width), width))
 
 
 def _up(n: int) -> np.ndarray:

@@ -19,8 +19,10 @@ def test_responses_equal_rolling_and_summing(size, seed):
     random = torch.Generator().manual_seed(seed)
     views, filters = torch.randn(n, h, w, generator=random), torch.randn(m, h, w, generator=random)
     rolled = torch.stack([torch.roll(views, k, dims=-1) for k in range(w)], dim=-1)  # (n, h, w, k)
-    expected = torch.einsum("nhwk,mhw->nmk", rolled, filters)
+    biases = torch.randn(m, generator=random)
+    expected = torch.einsum("nhwk,mhw->nkm", rolled, filters)
     assert torch.allclose(FilterBank(filters).responses(views), expected, atol=1e-4)
+    assert torch.allclose(FilterBank(filters, biases).responses(views), expected + biases, atol=1e-4)
 
 
 def test_chunks_change_nothing(monkeypatch):
@@ -34,7 +36,8 @@ def test_chunks_change_nothing(monkeypatch):
 def test_rotations_roll():
     view = torch.randn(3, 8)
     assert torch.equal(
-        rotations(view, torch.tensor([0, 3, 7])), torch.stack([torch.roll(view, k, dims=1) for k in (0, 3, 7)])
+        rotations(view.expand(3, 3, 8), torch.tensor([0, 3, 7])),
+        torch.stack([torch.roll(view, k, dims=1) for k in (0, 3, 7)]),
     )
 
 
@@ -78,3 +81,23 @@ def test_the_chosen_rotation_lies_in_the_window(seed):
 def test_a_scan_of_no_angle_is_refused(angle):
     with pytest.raises(InputError, match="scan"):
         scan_window(36, angle)
+
+
+def test_wide_views_are_rotated_by_an_fft_and_narrow_ones_by_a_matrix_to_the_same_end(monkeypatch):
+    views, filters, biases = torch.randn(3, 4, 24), torch.randn(7, 4, 24), torch.randn(7)
+    by_matrix = FilterBank(filters, biases).responses(views)
+    monkeypatch.setattr(rotation, "WIDE", 4)
+    by_fft = FilterBank(filters, biases)
+    assert by_fft._inverse is None
+    assert torch.allclose(by_fft.responses(views), by_matrix, atol=1e-4)
+
+
+def test_responses_can_be_learned_from():
+    """Their gradient is that of the loop that rolls the view."""
+    views = torch.randn(2, 3, 8)
+    filters, biases = torch.randn(4, 3, 8, requires_grad=True), torch.randn(4, requires_grad=True)
+    rolled = torch.stack([torch.roll(views, k, dims=-1) for k in range(8)], dim=-1)
+    slow = torch.einsum("nhwk,mhw->nkm", rolled, filters) + biases
+    expected = torch.autograd.grad(slow.square().sum(), (filters, biases))
+    found = torch.autograd.grad(FilterBank(filters, biases).responses(views).square().sum(), (filters, biases))
+    assert all(torch.allclose(a, b, rtol=1e-4, atol=1e-3) for a, b in zip(found, expected, strict=True))

@@ -106,8 +106,8 @@ class AdaBoost(Model):
 
 def votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:
     """Sum of the votes of all threshold units at each rotation."""
-    says = (bank.responses(views) > learned["cuts"][:, None]).float() * 2 - 1
-    return torch.einsum("nmw,m->nw", says, learned["votes"])
+    says = (bank.responses(views) > learned["cuts"]).float() * 2 - 1
+    return says @ learned["votes"]
 
 
 class Stump(NamedTuple):

@@ -59,10 +59,10 @@ class Autoencoder(Model):
         self._overlap, self._lean, self._rest = weights @ weights.T, weights @ visible, visible @ visible
 
     def _scan(self, views: Images) -> Scans:
-        responses = self._bank.responses(views)  # (n, units + 1, w)
-        drive, bias = responses[:, :-1], responses[:, -1]
-        h = torch.tanh(drive + self.learned["hidden"][:, None])
-        product = (h * drive).sum(dim=1) + bias
-        rebuilt = (h * (self._overlap @ h)).sum(dim=1) + 2 * torch.einsum("nmw,m->nw", h, self._lean) + self._rest
+        responses = self._bank.responses(views)  # (n, w, units + 1)
+        drive, bias = responses[..., :-1], responses[..., -1]
+        h = torch.tanh(drive + self.learned["hidden"])
+        product = (h * drive).sum(dim=2) + bias
+        rebuilt = (h * (h @ self._overlap)).sum(dim=2) + 2 * (h @ self._lean) + self._rest
         squared = views.square().sum(dim=(1, 2))[:, None] - 2 * product + rebuilt
         return -(squared.clamp(min=0) / views[0].numel()).sqrt()

@@ -40,7 +40,7 @@ class Chain(PerfectMemory):
         pick = torch.linspace(0, len(self.snapshots) - 1, min(SAMPLE, len(self.snapshots))).round().long()
         sample = self.snapshots[pick] - self._level
         energies = sample.square().sum(dim=(1, 2))
-        correlation = FilterBank(sample).responses(sample).amax(dim=2)
+        correlation = FilterBank(sample).responses(sample).amax(dim=1)
         squared = (energies[:, None] + energies - 2 * correlation)[
             torch.triu_indices(len(sample), len(sample), 1).unbind()
         ]

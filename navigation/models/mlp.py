@@ -138,11 +138,12 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         assert self.shape is not None
         depth = sum(key.startswith("weights") for key in self.learned)
         self._layers = [(self.learned[f"weights{k}"], self.learned[f"biases{k}"]) for k in range(depth)]
-        self._bank = FilterBank(self._layers[0][0].reshape(-1, *self.shape))
+        weights, biases = self._layers[0]
+        self._bank = FilterBank(weights.reshape(-1, *self.shape), biases)
 
     def _scan(self, views: Images) -> Scans:
         """The first layer's weights are the engine's filters; the others see its units at each rotation."""
-        activity = self._bank.responses(views).movedim(1, 2) + self._layers[0][1]  # (n, w, units)
+        activity = self._bank.responses(views)  # (n, w, units)
         rest = self._layers[1:]
         return forward(ACTIVATIONS[self.activation](activity), rest, self.activation)
 

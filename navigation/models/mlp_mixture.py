@@ -36,7 +36,7 @@ class MLPMixture(MLPRotation):
 
     def speaking(self, views: Images) -> Int64[torch.Tensor, "n w"]:
         """Which stretch's network finds each rotation most familiar."""
-        return self._outputs(self._here(views)).argmax(dim=1)
+        return self._outputs(self._here(views)).argmax(dim=2)
 
     def _scan(self, views: Images) -> Scans:
-        return self._outputs(views).logsumexp(dim=1)
+        return self._outputs(views).logsumexp(dim=2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 import torch
-from jaxtyping import Int64
+from jaxtyping import Float32, Int64
 from torch.nn.functional import log_softmax, relu
 
 from ..familiarity import Images, Learned, Model, Scans
@@ -62,9 +62,9 @@ class MLPRotation(Model):
         for batch in islice(batches(n, self.batch_size, random), steps):
             noise = self._here(torch.randn(len(batch), height, width, generator=random))
             seen = swayed(views[self._here(batch)], math.radians(self.sway_deg), random) + self.noise * spread * noise
-            outputs = network_outputs(FilterBank(weights), biases, output, seen)  # (n, networks, w)
+            outputs = network_outputs(FilterBank(weights, biases), output, seen)  # (n, w, networks)
             chances = log_softmax(outputs.flatten(start_dim=1), dim=1).reshape(outputs.shape)
-            right = chances[torch.arange(len(batch)), stretch[batch]]
+            right = chances[torch.arange(len(batch)), :, stretch[batch]]
             loss = -(right @ target).mean()
             optimiser.zero_grad()
             loss.backward()
@@ -76,13 +76,13 @@ class MLPRotation(Model):
         return {"weights": (None, height, width), "biases": (None,), "output": (None, self.units)}
 
     def _prepare(self) -> None:
-        self._bank = FilterBank(self.learned["weights"])
+        self._bank = FilterBank(self.learned["weights"], self.learned["biases"])
 
     def _outputs(self, views: Images) -> torch.Tensor:
-        return network_outputs(self._bank, self.learned["biases"], self.learned["output"], views)
+        return network_outputs(self._bank, self.learned["output"], views)
 
     def _scan(self, views: Images) -> Scans:
-        return self._outputs(views)[:, 0]
+        return self._outputs(views)[..., 0]
 
 
 def swayed(views: Images, deviation: float, random: torch.Generator) -> Images:
@@ -114,7 +114,9 @@ def warmth(done: float) -> float:
     return min(1.0, 10 * done + 0.01) * 0.5 * (1 + math.cos(math.pi * done))
 
 
-def network_outputs(bank: FilterBank, biases: torch.Tensor, output: torch.Tensor, views: Images) -> torch.Tensor:
-    """Output (view, network, rotation) of networks that see the same views; `output` is (networks, units)."""
-    activity = relu(bank.responses(views) + biases[:, None])
-    return torch.einsum("nsuw,su->nsw", activity.unflatten(1, output.shape), output)
+def network_outputs(
+    bank: FilterBank, output: Float32[torch.Tensor, "networks units"], views: Images
+) -> Float32[torch.Tensor, "n w networks"]:
+    """Output of networks that see the same views; the bank holds the units of all of them, one network after the other."""
+    activity = relu(bank.responses(views)).unflatten(2, output.shape)  # (n, w, networks, units)
+    return torch.einsum("nwsu,su->nws", activity, output)

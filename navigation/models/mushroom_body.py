@@ -79,7 +79,7 @@ class MushroomBody(IncrementalModel):
 
     def _projection(self, fields: FilterBank, view: Float32[torch.Tensor, "h w"]) -> Float32[torch.Tensor, "neurons w"]:
         """What the projection neurons send at each rotation. Over all rotations, a field sees all of its elevation."""
-        (averages,) = fields.responses(view[None])
+        averages = fields.responses(view[None])[0].T
         contrast, mean = torch.std_mean(averages, dim=1, keepdim=True, correction=0)
         return (averages - mean) / (contrast + 0.02 * contrast.max() + 1e-9) ** self.adaptation
 

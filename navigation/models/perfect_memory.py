@@ -1,5 +1,9 @@
 """Perfect memory: every view of the route is kept, and the nearest is recognised."""
 
+from typing import no_type_check
+
+import numba
+import numpy as np
 import torch
 from jaxtyping import Float32, Int64
 
@@ -8,6 +12,7 @@ from ..rotation import FilterBank, rotations
 
 # float32 correlations of images with norms a and b are off by less than this times a b (measured: 1.4e-7).
 ROUNDING = 4e-6
+AT_ONCE = 256  # rotations scored exactly at once
 
 
 class PerfectMemory(IncrementalModel):
@@ -43,7 +48,7 @@ class PerfectMemory(IncrementalModel):
         self._level = self.snapshots.mean()
         centred = self.snapshots - self._level
         self._energies = centred.square().sum(dim=(1, 2))
-        self._bank = FilterBank(centred)
+        self._bank = FilterBank(-2 * centred, self._energies)  # |v - s|^2 = |s|^2 - 2 v . s + |v|^2
 
     def _scan(self, views: Images) -> Scans:
         return self.match(views)[0]
@@ -57,9 +62,8 @@ class PerfectMemory(IncrementalModel):
         index = torch.zeros((n, width), dtype=torch.int64, device=views.device)
         if n == 0:
             return best, index
-        for part, correlation in self._bank.chunks(centred, among):
-            # |v - s|^2 = |v|^2 + |s|^2 - 2 v . s; |v|^2 is the same for all s and joins at the end.
-            nearest, which = (self._energies[part, None] - 2 * correlation).min(dim=1)
+        for part, distances in self._bank.chunks(centred, among):  # but for |v|^2, which is the same for all
+            nearest, which = lowest(distances)
             closer = nearest < best
             best = torch.where(closer, nearest, best)
             index = torch.where(closer, which + part.start, index)
@@ -71,7 +75,36 @@ class PerfectMemory(IncrementalModel):
         """Make the squared distances exact that rounding leaves in doubt about being the smallest, and their neighbours, in place."""
         doubtful = squared <= squared.min(dim=1, keepdim=True).values + tolerance[:, None]
         doubtful |= doubtful.roll(1, dims=1) | doubtful.roll(-1, dims=1)  # a heading is interpolated from three
-        for view, row, snapshot, mask in zip(views, squared, index, doubtful, strict=True):
-            for turns in torch.nonzero(mask)[:, 0].split(32):
-                difference = rotations(view, turns).double() - self.snapshots[snapshot[turns]]
-                row[turns] = difference.square().sum(dim=(1, 2)).float()
+        for view, turn in zip(*(each.split(AT_ONCE) for each in torch.nonzero(doubtful, as_tuple=True)), strict=True):
+            difference = rotations(views[view], turn).double() - self.snapshots[index[view, turn]]
+            squared[view, turn] = difference.square().sum(dim=(1, 2)).float()
+
+
+def lowest(
+    distances: Float32[torch.Tensor, "n w m"],
+) -> tuple[Float32[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
+    """The least of each row, and where it is: the first of equal ones."""
+    if distances.device.type != "cpu":
+        return distances.min(dim=2)
+    rows = distances.movedim(0, 1).contiguous()  # as it lies in memory
+    values, index = torch.empty(rows.shape[:2]), torch.empty(rows.shape[:2], dtype=torch.int64)
+    _lowest(rows.numpy(), values.numpy(), index.numpy())
+    return values.movedim(0, 1), index.movedim(0, 1)
+
+
+@no_type_check  # or the tests' type checker would wrap it before numba compiles it
+@numba.njit(nogil=True, cache=True, fastmath={"nnan", "nsz"})
+def _lowest(rows, values, index):
+    """See `lowest`: the least of 64 numbers after the other, and then where it is among them."""
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            best, first = np.inf, 0
+            for start in range(0, rows.shape[2], 64):
+                low = rows[i, j, start]
+                for k in range(start + 1, min(start + 64, rows.shape[2])):
+                    low = min(low, rows[i, j, k])
+                if low < best:
+                    best, first = low, start
+            while rows[i, j, first] != best:
+                first += 1
+            values[i, j], index[i, j] = best, first

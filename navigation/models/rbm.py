@@ -56,10 +56,14 @@ class RBM(Model):
         return {"weights": (self.units, height, width), "visible": (height, width), "hidden": (self.units,)}
 
     def _prepare(self) -> None:
-        self._bank = FilterBank(torch.cat([self.learned["weights"], self.learned["visible"][None]]))
+        hidden = self.learned["hidden"]
+        filters = torch.cat([self.learned["weights"], self.learned["visible"][None]])
+        self._bank = FilterBank(filters, torch.cat([hidden, hidden.new_zeros(1)]))
 
     def _scan(self, views: Images) -> Scans:
-        responses = self._bank.responses(self.scale * views)  # (n, units + 1, w)
-        hidden, visible = self.learned["hidden"], self.learned["visible"]
-        squared = (self.scale * views).square().sum(dim=(1, 2))[:, None] - 2 * responses[:, -1] + visible.square().sum()
-        return softplus(hidden[:, None] + responses[:, :-1]).sum(dim=1) - squared / 2
+        responses = self._bank.responses(self.scale * views)  # (n, w, units + 1)
+        visible = self.learned["visible"]
+        squared = (
+            (self.scale * views).square().sum(dim=(1, 2))[:, None] - 2 * responses[..., -1] + visible.square().sum()
+        )
+        return softplus(responses[..., :-1]).sum(dim=2) - squared / 2
