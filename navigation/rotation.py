@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Float32, Int64
+from jaxtyping import Bool, Float, Float32
 
 from world.errors import InputError
 from world.geometry import turn_of_columns, wrap_angle
@@ -33,8 +33,8 @@ class FilterBank:
     def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
         self.shape = tuple(filters.shape[1:])
         self.biases = biases
-        spectra = torch.fft.rfft(filters).permute(2, 1, 0)  # (f, h, m)
-        self.spectra: Float32[torch.Tensor, "f parts m"] = torch.cat([spectra.real, spectra.imag], dim=1)
+        spectra = torch.view_as_real(torch.fft.rfft(filters))  # (m, h, f, 2)
+        self.spectra: Float32[torch.Tensor, "f parts m"] = spectra.permute(2, 1, 3, 0).flatten(1, 2).contiguous()
         self._inverse = inverse_transform(self.shape[1]).to(filters.device) if self.shape[1] < WIDE else None
 
     def __len__(self) -> int:
@@ -46,10 +46,10 @@ class FilterBank:
         """Responses of views to consecutive slices of the filters (those `among`), no more than CHUNK_BYTES of them at once."""
         n, _, width = views.shape
         frequencies = width // 2 + 1
-        spectra = torch.fft.rfft(views).permute(2, 0, 1)  # (f, n, h)
-        real, imaginary = spectra.real, spectra.imag
-        # conj(V) F, for each view a row that makes its real part and one that makes its imaginary part
-        rows = torch.cat([torch.cat([real, imaginary], dim=2), torch.cat([-imaginary, real], dim=2)], dim=1)
+        spectra = torch.fft.rfft(views)
+        # For each view two rows: one makes the real part of conj(V) F, the other the imaginary part.
+        rows = torch.view_as_real(torch.stack([spectra, 1j * spectra]))  # (2, n, h, f, 2)
+        rows = rows.permute(3, 0, 1, 2, 4).reshape(frequencies, 2 * n, -1)
         at_once = max(1, CHUNK_BYTES // (8 * width * max(1, n)))
         first, last, _ = (among or slice(None)).indices(len(self))
         for start in range(first, last, at_once):
@@ -86,15 +86,6 @@ def multiplied(a: Float32[torch.Tensor, "i k"], b: Float32[torch.Tensor, "k j"])
     if a.device.type == "cpu" and not b.requires_grad and torch.backends.mkldnn.is_available():
         return torch.ops.mkldnn._linear_pointwise(a, b.T, None, "none", [], "")
     return a @ b
-
-
-def rotations(
-    views: Float32[torch.Tensor, "k h w"], turns: Int64[torch.Tensor, " k"]
-) -> Float32[torch.Tensor, "k h w"]:
-    """Each view at its rotation, `turns` columns to the left."""
-    width = views.shape[2]
-    columns = (torch.arange(width, device=views.device) - turns[:, None]) % width  # (k, w)
-    return views.gather(2, columns[:, None].expand(views.shape))
 
 
 def bell(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:

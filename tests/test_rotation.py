@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from navigation import rotation
-from navigation.rotation import FilterBank, best_turn, rotations, scan_window
+from navigation.rotation import FilterBank, best_turn, scan_window
 from world.errors import InputError
 
 sizes = st.tuples(st.integers(1, 4), st.integers(1, 5), st.integers(1, 6), st.integers(4, 15))
@@ -31,14 +31,6 @@ def test_chunks_change_nothing(monkeypatch):
     monkeypatch.setattr(rotation, "CHUNK_BYTES", 5000)
     assert len(list(bank.chunks(views))) > 1
     assert torch.allclose(bank.responses(views), whole, atol=1e-5)
-
-
-def test_rotations_roll():
-    view = torch.randn(3, 8)
-    assert torch.equal(
-        rotations(view.expand(3, 3, 8), torch.tensor([0, 3, 7])),
-        torch.stack([torch.roll(view, k, dims=1) for k in (0, 3, 7)]),
-    )
 
 
 def test_the_best_turn_is_left_for_low_rotations_and_right_for_high_ones():

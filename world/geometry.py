@@ -10,6 +10,7 @@ angle rolls the panorama right by k columns.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -123,7 +124,7 @@ class Route:
         """The last pose."""
         return Pose(*self.poses[-1].tolist())
 
-    @property
+    @cached_property
     def arc(self) -> Float[np.ndarray, " n"]:
         """Distance along the route of each point (m)."""
         return np.r_[0.0, np.cumsum(np.hypot(*np.diff(self.xy, axis=0).T))]
@@ -133,11 +134,16 @@ class Route:
         """Length of the route (m)."""
         return float(self.arc[-1])
 
+    @cached_property
+    def _unwrapped(self) -> Float[np.ndarray, " n"]:
+        """The headings without jumps of a whole turn."""
+        return np.unwrap(self.poses[:, 2])
+
     def at(self, distance) -> Float[np.ndarray, "k 3"]:
         """Poses at distances along the route (m, clipped to its ends); headings are interpolated on the circle."""
         distance, arc = np.atleast_1d(distance), self.arc
         x, y = (np.interp(distance, arc, self.poses[:, i]) for i in (0, 1))
-        heading = np.interp(distance, arc, np.unwrap(self.poses[:, 2]))
+        heading = np.interp(distance, arc, self._unwrapped)
         return np.column_stack([x, y, wrap_angle(heading)])
 
     def resampled(self, spacing: float) -> "Route":
@@ -159,11 +165,11 @@ class Route:
         if len(xy) > at_once:
             parts = [self.nearest(xy[i : i + at_once]) for i in range(0, len(xy), at_once)]
             return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-        start, step = self.xy[:-1], np.diff(self.xy, axis=0)
-        length = np.hypot(*step.T)
-        offset = xy[:, None] - start  # (k, n - 1, 2)
-        share = np.clip((offset * step).sum(-1) / length**2, 0, 1)
-        distance = np.hypot(*np.moveaxis(offset - share[..., None] * step, -1, 0))
-        best = distance.argmin(axis=1)
+        (x, y), (dx, dy) = self.xy[:-1].T, np.diff(self.xy, axis=0).T
+        length = np.hypot(dx, dy)
+        from_x, from_y = xy[:, :1] - x, xy[:, 1:] - y  # (k, n - 1)
+        share = ((from_x * dx + from_y * dy) / length**2).clip(0, 1)
+        squared = (from_x - share * dx) ** 2 + (from_y - share * dy) ** 2
+        best = squared.argmin(axis=1)
         rows = np.arange(len(xy))
-        return distance[rows, best], self.arc[best] + share[rows, best] * length[best]
+        return np.sqrt(squared[rows, best]), self.arc[best] + share[rows, best] * length[best]

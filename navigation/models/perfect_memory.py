@@ -8,11 +8,10 @@ import torch
 from jaxtyping import Float32, Int64
 
 from ..familiarity import Images, IncrementalModel, Learned, Scans, check_scan
-from ..rotation import FilterBank, rotations
+from ..rotation import FilterBank
 
 # float32 correlations of images with norms a and b are off by less than this times a b (measured: 1.4e-7).
 ROUNDING = 4e-6
-AT_ONCE = 256  # rotations scored exactly at once
 
 
 class PerfectMemory(IncrementalModel):
@@ -45,6 +44,7 @@ class PerfectMemory(IncrementalModel):
 
     def _prepare(self) -> None:
         # The distance does not change when one number is taken from all pixels; float32 keeps more digits of it around 0.
+        self._exact = self.snapshots.cpu()
         self._level = self.snapshots.mean()
         centred = self.snapshots - self._level
         self._energies = centred.square().sum(dim=(1, 2))
@@ -55,29 +55,42 @@ class PerfectMemory(IncrementalModel):
 
     def _nearest(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
-        n, height, width = views.shape
         centred = views - self._level
         energies = centred.square().sum(dim=(1, 2))
-        best = torch.full((n, width), torch.inf, device=views.device)
-        index = torch.zeros((n, width), dtype=torch.int64, device=views.device)
-        if n == 0:
-            return best, index
+        best, index = None, None
         for part, distances in self._bank.chunks(centred, among):  # but for |v|^2, which is the same for all
             nearest, which = lowest(distances)
-            closer = nearest < best
-            best = torch.where(closer, nearest, best)
-            index = torch.where(closer, which + part.start, index)
-        squared = best + energies[:, None]
-        self._rescore(views, squared, index, ROUNDING * (energies + self._energies[among].max()))
-        return -(squared.clamp(min=0) / (height * width)).sqrt(), index
+            which = which + part.start
+            if best is not None and index is not None:
+                which = torch.where(nearest < best, which, index)
+                nearest = torch.minimum(nearest, best)
+            best, index = nearest, which
+        if best is None or index is None:
+            return views.new_empty(0, views.shape[2]), torch.empty(0, views.shape[2], dtype=torch.int64)
+        squared = (best + energies[:, None]).cpu().numpy()
+        tolerance = ROUNDING * (energies.cpu().numpy() + float(self._energies[among].max()))
+        _rescore(views.cpu().numpy(), self._exact.numpy(), index.cpu().numpy(), tolerance, squared)
+        return self._here(torch.from_numpy(-np.sqrt(squared / np.float32(views[0].numel())))), index
 
-    def _rescore(self, views: Images, squared: torch.Tensor, index: torch.Tensor, tolerance: torch.Tensor) -> None:
-        """Make the squared distances exact that rounding leaves in doubt about being the smallest, and their neighbours, in place."""
-        doubtful = squared <= squared.min(dim=1, keepdim=True).values + tolerance[:, None]
-        doubtful |= doubtful.roll(1, dims=1) | doubtful.roll(-1, dims=1)  # a heading is interpolated from three
-        for view, turn in zip(*(each.split(AT_ONCE) for each in torch.nonzero(doubtful, as_tuple=True)), strict=True):
-            difference = rotations(views[view], turn).double() - self.snapshots[index[view, turn]]
-            squared[view, turn] = difference.square().sum(dim=(1, 2)).float()
+
+@no_type_check  # or the tests' type checker would wrap it before numba compiles it
+@numba.njit(nogil=True, cache=True)
+def _rescore(views, snapshots, index, tolerance, squared):
+    """Make the squared distances (n, w) exact that rounding leaves in doubt about being their view's least, and their neighbours."""
+    n, height, width = views.shape
+    for v in range(n):
+        limit = squared[v].min() + tolerance[v]
+        doubtful = squared[v] <= limit
+        for turn in range(width):
+            # A heading is interpolated from three.
+            if doubtful[turn] or doubtful[turn - 1] or doubtful[(turn + 1) % width]:
+                snapshot = snapshots[index[v, turn]]
+                total = 0.0
+                for i in range(height):
+                    for j in range(width):  # the view rolled right by `turn`
+                        total += (np.float64(views[v, i, j - turn]) - snapshot[i, j]) ** 2
+                squared[v, turn] = total
+            squared[v, turn] = max(squared[v, turn], np.float32(0.0))
 
 
 def lowest(
