@@ -1,6 +1,7 @@
 """The loop: look, scan, turn to the most familiar heading, step."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,18 +121,20 @@ class Agent:
 
         What they see is drawn, encoded and scanned together, which takes a fraction of the time. Walk k draws its noise from
         `seed` + k and takes the steps that it takes alone with that seed (but for rounding, where the model keeps no views).
+        Until the last one ends, torch works on one thread.
         """
         for start in starts:
             self._check_inside(start)
         walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
-        for index in range(self.step_limit + 1):
-            going = [k for k, walk in enumerate(walks) if not walk.ended]
-            if not going:
-                return
-            steps: list[Step | None] = [None] * len(walks)
-            for k, step in zip(going, self._steps(index, [walks[k] for k in going]), strict=True):
-                steps[k] = step
-            yield steps
+        with one_torch_thread():
+            for index in range(self.step_limit + 1):
+                going = [k for k, walk in enumerate(walks) if not walk.ended]
+                if not going:
+                    return
+                steps: list[Step | None] = [None] * len(walks)
+                for k, step in zip(going, self._steps(index, [walks[k] for k in going]), strict=True):
+                    steps[k] = step
+                yield steps
 
     def _steps(self, index: int, walks: "list[_Walk]") -> Iterator[Step]:
         """The next step of each of several walks."""
@@ -197,6 +200,17 @@ class Agent:
             raise InputError(
                 f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
             )
+
+
+@contextmanager
+def one_torch_thread() -> Iterator[None]:
+    """Keep torch to one thread: its others wait for more to do in a way that keeps the cores busy, and the renderer needs them."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 class _Walk:
