@@ -12,6 +12,7 @@ numbers, all of it but the rFFT is products of matrices.
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 import torch
@@ -55,12 +56,12 @@ class FilterBank:
         for start in range(first, last, at_once):
             part = slice(start, min(start + at_once, last))
             m = part.stop - start
-            product = torch.bmm(rows, self.spectra[:, :, part]).reshape(2 * frequencies, n * m)
+            transformed = torch.bmm(rows, self.spectra[:, :, part]).reshape(2 * frequencies, n * m)
             if self._inverse is None:
-                halves = product.reshape(frequencies, 2, n, m)
+                halves = transformed.reshape(frequencies, 2, n, m)
                 responses = torch.fft.irfft(torch.complex(halves[:, 0], halves[:, 1]), n=width, dim=0)
             else:
-                responses = multiplied(self._inverse, product).reshape(width, n, m)
+                responses = product(self._inverse, transformed).reshape(width, n, m)
             if self.biases is not None:
                 responses = responses + self.biases[part]
             yield part, responses.movedim(0, 1)
@@ -70,9 +71,11 @@ class FilterBank:
         n, m = len(views), len(self)
         if n == 0 or m == 0:
             return torch.empty(n, self.shape[1], m, device=self.spectra.device)
-        return torch.cat([response for _, response in self.chunks(views)], dim=2)
+        found = [response for _, response in self.chunks(views)]
+        return found[0] if len(found) == 1 else torch.cat(found, dim=2)
 
 
+@lru_cache(maxsize=16)
 def inverse_transform(width: int) -> Float32[torch.Tensor, "{width} parts"]:
     """The matrix of the inverse rFFT: from the real and the imaginary part of each frequency to `width` values."""
     frequency = torch.arange(width // 2 + 1, dtype=torch.float64)
@@ -81,11 +84,24 @@ def inverse_transform(width: int) -> Float32[torch.Tensor, "{width} parts"]:
     return torch.stack([phase.cos() * weight, -phase.sin() * weight], dim=2).reshape(width, -1).float()
 
 
-def multiplied(a: Float32[torch.Tensor, "i k"], b: Float32[torch.Tensor, "k j"]) -> Float32[torch.Tensor, "i j"]:
-    """a @ b, by oneDNN where it can: on some processors it is thrice as fast as what torch takes by itself."""
-    if a.device.type == "cpu" and not b.requires_grad and torch.backends.mkldnn.is_available():
+class _Product(torch.autograd.Function):
+    """a @ b by oneDNN, which on some processors is thrice as fast as what torch takes by itself; a is a constant."""
+
+    @staticmethod
+    def forward(ctx, a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        ctx.save_for_backward(a)
         return torch.ops.mkldnn._linear_pointwise(a, b.T, None, "none", [], "")
-    return a @ b
+
+    @staticmethod
+    def backward(ctx, gradient: torch.Tensor) -> tuple[None, torch.Tensor]:
+        (a,) = ctx.saved_tensors
+        return None, torch.ops.mkldnn._linear_pointwise(a.T, gradient.T, None, "none", [], "")
+
+
+def product(a: Float32[torch.Tensor, "i k"], b: Float32[torch.Tensor, "k j"]) -> Float32[torch.Tensor, "i j"]:
+    """a @ b, where a is a constant."""
+    fast = a.device.type == "cpu" and torch.backends.mkldnn.is_available()
+    return _Product.apply(a, b) if fast else a @ b
 
 
 def bell(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:

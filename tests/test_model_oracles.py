@@ -32,7 +32,7 @@ from navigation.models import (
     make_model,
 )
 from navigation.models.adaboost import best_stump, haar_filters
-from navigation.models.infomax import RATES, infomax_updates
+from navigation.models.infomax import RATES, infomax_update
 from navigation.models.mlp_rotation import swayed
 from navigation.models.mushroom_body import receptive_fields
 from world.errors import InputError
@@ -367,7 +367,7 @@ def test_infomax_learns_by_its_formula(units, inputs, rate, seed):
     random = np.random.default_rng(seed)
     weights, view = random.normal(size=(units, inputs)), random.normal(size=inputs)
     learned = torch.tensor(weights, dtype=torch.float32)
-    infomax_updates(learned, torch.tensor(view, dtype=torch.float32)[None], rate)
+    infomax_update(learned, torch.tensor(view, dtype=torch.float32), rate)
     expected = weights.copy()
     u = [sum(weights[i, j] * view[j] for j in range(inputs)) for i in range(units)]
     for i in range(units):
@@ -391,7 +391,7 @@ def test_infomax_passes_the_views_in_order_at_its_rate(rate):
     assert torch.allclose(by_hand.std(dim=1), torch.ones(120), atol=1e-5)
     eta = {"z-scored": 1 / 120**2, "unit-range": 0.97 / 120**2, "baddeley": 0.01 / 120}.get(rate, rate)
     for view in [*views(4), *views(4)]:
-        infomax_updates(by_hand, view.flatten()[None], eta)
+        infomax_update(by_hand, view.flatten(), eta)
     learned = Infomax(rate=rate, traversals=2).fit(views(4)).learned["weights"]
     assert torch.allclose(learned.flatten(start_dim=1), by_hand, rtol=1e-5, atol=1e-6)
 

@@ -18,8 +18,6 @@ RATES = {
     "baddeley": lambda inputs, units: 0.01 / units,  # Baddeley et al. 2012; Knight et al. 2019
 }
 
-AT_ONCE = 32  # views after which the weights are brought up to date
-
 
 @dataclass(kw_only=True, eq=False)
 class Infomax(IncrementalModel):
@@ -51,8 +49,8 @@ class Infomax(IncrementalModel):
         units, inputs = weights.shape
         rate = RATES[self.rate](inputs, units) if isinstance(self.rate, str) else self.rate
         for _ in range(self.traversals):
-            for some in views.flatten(start_dim=1).split(AT_ONCE):
-                infomax_updates(weights, some, rate)
+            for view in views.flatten(start_dim=1):
+                infomax_update(weights, view, rate)
         return {"weights": weights.reshape(-1, *views.shape[1:])}
 
     def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
@@ -68,21 +66,10 @@ class Infomax(IncrementalModel):
         return total
 
 
-def infomax_updates(
-    weights: Float32[torch.Tensor, "units inputs"], views: Float32[torch.Tensor, "n inputs"], rate: float
+def infomax_update(
+    weights: Float32[torch.Tensor, "units inputs"], view: Float32[torch.Tensor, " inputs"], rate: float
 ) -> None:
-    """Add rate (W - (y + u) u^T W) to the weights for one view after the other, in place.
-
-    u^T W is a vector, so each update is of rank one, and after t of them W_t = c W - L R^T with t columns in L and R. Then W x of all
-    views is one product, and the only pass over the weights for each view is that of u^T W.
-    """
-    seen = weights @ views.T  # (units, n)
-    scale = 1.0
-    left, right = weights.new_zeros(len(weights), len(views)), views.new_zeros(views.shape[1], len(views))
-    for t, view in enumerate(views):
-        u = scale * seen[:, t] - left[:, :t] @ (view @ right[:, :t])
-        back = scale * (u @ weights) - right[:, :t] @ (u @ left[:, :t])
-        scale *= 1 + rate
-        left[:, :t] *= 1 + rate
-        left[:, t], right[:, t] = rate * (torch.tanh(u) + u), back
-    weights.mul_(scale).addmm_(left, right.T, alpha=-1)
+    """Add rate (W - (y + u) u^T W) to the weights, in place: u^T W is a vector, so this is an update of rank one."""
+    u = weights @ view
+    back = u @ weights
+    weights.addr_(torch.tanh(u) + u, back, beta=1 + rate, alpha=-rate)

@@ -57,7 +57,7 @@ class MLPRotation(Model):
 
         target = self._here(bell(width, math.radians(self.target_deg)))
         spread = self._here(views.std())
-        optimiser = torch.optim.AdamW(parameters, lr=self.rate, weight_decay=self.penalty)
+        optimiser = torch.optim.AdamW(parameters, lr=self.rate, weight_decay=self.penalty, fused=True)
         schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: warmth(step / steps))
         for batch in islice(batches(n, self.batch_size, random), steps):
             noise = self._here(torch.randn(len(batch), height, width, generator=random))
