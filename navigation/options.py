@@ -10,7 +10,7 @@ import tyro
 
 from world.errors import InputError
 
-from .terminal import progress, say
+from .terminal import progress, say, saying_when_slow
 
 if TYPE_CHECKING:
     import numpy as np
@@ -89,7 +89,8 @@ class SightOptions:
     def open_renderer(self, world):
         from render import open_renderer
 
-        return open_renderer(world, self.eye(), self.renderer)
+        with saying_when_slow("compiling the renderer; this is done once, and takes up to a minute"):
+            return open_renderer(world, self.eye(), self.renderer)
 
 
 @dataclass

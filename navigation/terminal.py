@@ -3,12 +3,25 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Timer
 from typing import Any
 
 
 def say(text: str) -> None:
     """Tell the person something that is not the result."""
     print(text, file=sys.stderr)
+
+
+@contextmanager
+def saying_when_slow(text: str, seconds: float = 1.0) -> Iterator[None]:
+    """Say what takes so long, once it takes longer than `seconds`."""
+    timer = Timer(seconds, say, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @contextmanager

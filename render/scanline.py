@@ -367,6 +367,8 @@ class ScanlineRenderer:
         self._scratch: list[np.ndarray] = []  # keys (see `_draw`) not in use at the moment
         self._threads = threads or len(os.sched_getaffinity(0))
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(self._threads)
+        # Drawing nothing compiles what draws, where that was not done before, or loads it.
+        self._render_strip(np.empty((0, 3)), np.empty((0, eye.height, eye.width, 4), dtype=np.uint8), 0, eye.width)
 
     def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width 4"]:
         """See `Renderer.render`. Poses are shared out among threads; a single pose is cut into strips of columns."""
