@@ -27,8 +27,9 @@ format: $(VENV)/developer
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(VENV)/developer  ## what things cost here, beside the naive way
-	$(BIN)/python benchmarks/bench.py
+bench: $(VENV)/developer  ## what things cost here, beside the naive way, into docs/performance.md; run it with nothing else running
+	$(BIN)/pytest benchmarks -o python_files='bench_*.py' --benchmark-quiet --benchmark-json=$(VENV)/bench.json
+	$(BIN)/python benchmarks/report.py $(VENV)/bench.json
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -89,7 +89,7 @@ class SightOptions:
     def open_renderer(self, world):
         from render import open_renderer
 
-        with saying_when_slow("compiling the renderer; this is done once, and takes up to a minute"):
+        with saying_when_slow("compiling the renderer; this is done once, and takes some seconds"):
             return open_renderer(world, self.eye(), self.renderer)
 
 

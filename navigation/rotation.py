@@ -33,9 +33,11 @@ class FilterBank:
 
     def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
         self.shape = tuple(filters.shape[1:])
-        self.biases = biases
         spectra = torch.view_as_real(torch.fft.rfft(filters))  # (m, h, f, 2)
         self.spectra: Float32[torch.Tensor, "f parts m"] = spectra.permute(2, 1, 3, 0).flatten(1, 2).contiguous()
+        # The imaginary part of frequency 0 is nothing. The first row's takes the biases; see `chunks`.
+        if biases is not None:
+            self.spectra[0, 1] = biases
         self._inverse = inverse_transform(self.shape[1]).to(filters.device) if self.shape[1] < WIDE else None
 
     def __len__(self) -> int:
@@ -51,6 +53,7 @@ class FilterBank:
         # For each view two rows: one makes the real part of conj(V) F, the other the imaginary part.
         rows = torch.view_as_real(torch.stack([spectra, 1j * spectra]))  # (2, n, h, f, 2)
         rows = rows.permute(3, 0, 1, 2, 4).reshape(frequencies, 2 * n, -1)
+        rows[0, :n, 1] = width  # adds the biases to frequency 0, and so to all rotations
         at_once = max(1, CHUNK_BYTES // (8 * width * max(1, n)))
         first, last, _ = (among or slice(None)).indices(len(self))
         for start in range(first, last, at_once):
@@ -62,8 +65,6 @@ class FilterBank:
                 responses = torch.fft.irfft(torch.complex(halves[:, 0], halves[:, 1]), n=width, dim=0)
             else:
                 responses = product(self._inverse, transformed).reshape(width, n, m)
-            if self.biases is not None:
-                responses = responses + self.biases[part]
             yield part, responses.movedim(0, 1)
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:

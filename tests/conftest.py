@@ -9,7 +9,7 @@ from jaxtyping import install_import_hook
 
 # All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
 CHECKED = [
-    "world", "render.eye", "render.renderer", "render.cubemap", "render.raster", "render.database", "render.database_files",
+    "world", "render.eye", "render.tree", "render.renderer", "render.cubemap", "render.raster", "render.database", "render.database_files",
     "render.database_writing", "render.database_check", "render.database_flow", "navigation",
 ]  # fmt: skip
 install_import_hook(CHECKED, "typecheck.check")

@@ -10,7 +10,7 @@ from scenes import random_poses
 
 from navigation.agent import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Agent
 from navigation.encoding import Encoding
-from navigation.models import PerfectMemory
+from navigation.models import Chain, PerfectMemory
 from navigation.training import AHEAD, SIDES, learn, training_poses
 from navigation.trajectory import COLUMNS, Trajectory
 from render.eye import Eye
@@ -92,6 +92,34 @@ def test_the_same_seed_walks_the_same_and_another_does_not(renderer, route, memo
 
     assert path(3) == path(3)
     assert path(3) != path(4)
+
+
+@pytest.mark.parametrize("kind", [PerfectMemory, Chain])
+def test_walks_side_by_side_are_those_that_each_start_makes_alone(renderer, route, memory, kind):
+    """In the same places to the last bit; views that are not the best match may differ by rounding."""
+    model = memory if kind is PerfectMemory else kind().fit(memory.snapshots)
+    settings = {"heading_noise": 0.2, "max_steps": 40, "lost": 0.3}
+    starts = [route.start.moved(0.0, offset) for offset in (0.0, 0.15)]
+    starts.append(Pose(*route.at(route.length - 0.4)[0].tolist()))  # which arrives before the others
+    together = list(agent(renderer, route, model, seed=5, **settings).walk_many(starts))
+    assert all(len(steps) == 3 for steps in together)
+    for k, start in enumerate(starts):
+        side = [steps[k] for steps in together if steps[k] is not None]
+        alone = list(agent(renderer, route, model, seed=5 + k, **settings).walk(start))
+        assert [step.pose for step in side] == [step.pose for step in alone]
+        assert [(step.turn, step.match, step.place, step.reason) for step in side] == [
+            (step.turn, step.match, step.place, step.reason) for step in alone
+        ]
+    assert len({sum(steps[k] is not None for steps in together) for k in range(3)}) > 1  # some end before others
+
+
+def test_torch_has_its_threads_back_after_a_walk(renderer, route, memory):
+    torch.set_num_threads(2)
+    walk = agent(renderer, route, memory).walk(route.start)
+    next(walk)
+    assert torch.get_num_threads() == 1
+    walk.close()
+    assert torch.get_num_threads() == 2
 
 
 def test_noise_has_the_spread_that_was_asked_for(renderer):

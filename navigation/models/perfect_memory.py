@@ -59,7 +59,7 @@ class PerfectMemory(IncrementalModel):
         energies = centred.square().sum(dim=(1, 2))
         best, index = None, None
         for part, distances in self._bank.chunks(centred, among):  # but for |v|^2, which is the same for all
-            nearest, which = lowest(distances)
+            nearest, which = distances.min(dim=2)
             which = which + part.start
             if best is not None and index is not None:
                 which = torch.where(nearest < best, which, index)
@@ -91,33 +91,3 @@ def _rescore(views, snapshots, index, tolerance, squared):
                         total += (np.float64(views[v, i, j - turn]) - snapshot[i, j]) ** 2
                 squared[v, turn] = total
             squared[v, turn] = max(squared[v, turn], np.float32(0.0))
-
-
-def lowest(
-    distances: Float32[torch.Tensor, "n w m"],
-) -> tuple[Float32[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
-    """The least of each row, and where it is: the first of equal ones."""
-    if distances.device.type != "cpu":
-        return distances.min(dim=2)
-    rows = distances.movedim(0, 1).contiguous()  # as it lies in memory
-    values, index = torch.empty(rows.shape[:2]), torch.empty(rows.shape[:2], dtype=torch.int64)
-    _lowest(rows.numpy(), values.numpy(), index.numpy())
-    return values.movedim(0, 1), index.movedim(0, 1)
-
-
-@no_type_check  # or the tests' type checker would wrap it before numba compiles it
-@numba.njit(nogil=True, cache=True, fastmath={"nnan", "nsz"})
-def _lowest(rows, values, index):
-    """See `lowest`: the least of 64 numbers after the other, and then where it is among them."""
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            best, first = np.inf, 0
-            for start in range(0, rows.shape[2], 64):
-                low = rows[i, j, start]
-                for k in range(start + 1, min(start + 64, rows.shape[2])):
-                    low = min(low, rows[i, j, k])
-                if low < best:
-                    best, first = low, start
-            while rows[i, j, first] != best:
-                first += 1
-            values[i, j], index[i, j] = best, first

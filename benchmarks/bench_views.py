@@ -1,0 +1,66 @@
+"""Panoramas of the CPU renderer."""
+
+import naive
+import numpy as np
+import pytest
+import worlds
+
+from render import Eye, open_renderer
+from render.database_writing import Grid, published_part, write_database
+from world import InputError
+
+SHAPES = [(720, 150, 1), (90, 25, 4), (90, 25, 1), (120, 25, 4)]
+
+
+@pytest.mark.parametrize("size", SHAPES, ids=lambda size: "x".join(map(str, size)))
+@pytest.mark.parametrize("batch", [32, 1])
+def test_view(measure, size, batch):
+    name, world = worlds.everyday()
+    width, height, samples = size
+    eye = Eye(width=width, height=height, samples=samples)
+    poses = worlds.poses_in(world, 32)
+    with open_renderer(world, eye, "cpu") as renderer:
+        fine = Eye(width=width * samples, height=height * samples, samples=1)
+        columns = slice(0, fine.width, fine.width // 6)
+        measure(
+            f"view {width} x {height}{f', {samples} x {samples} rays a pixel' if samples > 1 else ''}, {name},"
+            f" {'in batches' if batch > 1 else 'one by one'}",
+            lambda: [renderer.render(part) for part in np.array_split(poses, 32 // batch)],
+            items=32,
+            unit="ms a view",
+            naive=lambda: naive.view(world, fine, poses[0], columns),
+            naive_share=len(range(*columns.indices(fine.width))) / fine.width,
+        )
+
+
+@pytest.mark.parametrize("n", [200, 2_000, 20_000, 200_000, 2_000_000])
+@pytest.mark.parametrize("size", [(720, 150), (90, 25)], ids=lambda size: "x".join(map(str, size)))
+def test_growth_with_triangles(measure, size, n):
+    world, (width, height) = worlds.blades(n), size
+    with open_renderer(world, Eye(width=width, height=height, samples=1), "cpu") as renderer:
+        poses = worlds.poses_in(world, 8)
+        measure(
+            f"view {width} x {height}, a meadow of {n:,} triangles", lambda: renderer.render(poses), items=8, unit="ms a view",
+            rounds=7, curve=("triangles", f"{width} x {height}", n),
+        )  # fmt: skip
+
+
+def test_view_by_opengl(measure):
+    name, world = worlds.everyday()
+    try:
+        renderer = open_renderer(world, Eye(), "egl")
+    except InputError as error:
+        pytest.skip(str(error))
+    with renderer:
+        poses = worlds.poses_in(world, 8)
+        measure(f"view 720 x 150, {name}, egl", lambda: renderer.render(poses), items=8, unit="ms a view", rounds=3)
+
+
+def test_the_published_grid_as_a_database(measure, tmp_path):
+    name, world = worlds.everyday()
+    grid = Grid.over(published_part(world.field), 0.2)
+    with open_renderer(world, Eye(), "cpu") as renderer:
+        measure(
+            f"{len(grid.poses()):,} views of 720 x 150, {name}, drawn and written as a PNG database",
+            lambda: write_database(tmp_path, renderer, grid), unit="s", rounds=1, warm=0,
+        )  # fmt: skip

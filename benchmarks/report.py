@@ -1,0 +1,77 @@
+"""From what pytest-benchmark measured (its JSON) to a table, the growth curves, and docs/performance.md's numbers."""
+
+import json
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import torch
+from rich.console import Console
+from rich.table import Table
+
+DOCS = Path(__file__).parents[1] / "docs"
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+
+
+def figures(measured: dict) -> list[dict]:
+    """What was measured, the figure of each in its unit, and how many times as long the naive version takes."""
+    rows = []
+    for each in measured["benchmarks"]:
+        info, seconds = each["extra_info"], each["stats"]["median"] / each["extra_info"]["items"]
+        spread = each["stats"]["iqr"] / each["stats"]["median"]
+        rows.append(info | {"seconds": seconds, "spread": spread, "figure": in_unit(seconds, info["unit"])})
+    return rows
+
+
+def in_unit(seconds: float, unit: str) -> str:
+    """A time an item as it is told: steps a second, s, or ms."""
+    if unit == "steps a second":
+        return f"{1 / seconds:,.0f} {unit}"
+    return f"{seconds:.3g} s" if unit == "s" else f"{1000 * seconds:.3g} {unit}"
+
+
+def cells(row: dict) -> tuple[str, str, str, str]:
+    """A row of the table: what, figure, spread, naive and ratio."""
+    naive = row["naive_seconds"]
+    against = "" if naive is None else f"{1000 * naive:,.0f} ms, {naive / row['seconds']:,.0f} times"
+    return row["name"], row["figure"], f"{row['spread']:.0%}", against
+
+
+def draw(rows: list[dict], axis: str, path: Path) -> None:
+    """The growth curves over `axis`, on logarithmic scales, beside what linear growth would be."""
+    figure, plot = plt.subplots(figsize=(5.2, 3.6), layout="constrained")
+    curves: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        if row["curve"] and row["curve"][0] == axis:
+            curves.setdefault(row["curve"][1], []).append((row["curve"][2], 1000 * row["seconds"]))
+    for name, points in curves.items():
+        x, y = zip(*sorted(points), strict=True)
+        plot.loglog(x, y, "o-", label=name)
+        plot.loglog(x, [y[0] * each / x[0] for each in x], ":", color="0.7", label="_linear")
+    plot.set(xlabel=axis, ylabel="ms a view", ylim=(None, 3 * max(y for points in curves.values() for _, y in points)))
+    plot.set_title("dotted: linear growth", fontsize=9, color="0.5")
+    plot.legend(frameon=False)
+    figure.savefig(path, metadata={"Date": None})
+
+
+def main(path: Path) -> None:
+    """Print the table and bring docs/performance.md up to date."""
+    measured = json.loads(path.read_text())
+    rows = figures(measured)
+    cpu = measured["machine_info"]["cpu"]
+    machine = f"{cpu.get('brand_raw', measured['machine_info']['processor'])}, {torch.get_num_threads()} cores, no GPU"
+    table = Table("what", "figure", "spread", "naive numpy", title=machine)
+    for row in rows:
+        table.add_row(*cells(row))
+    Console(width=150).print(table)
+    draw(rows, "triangles", DOCS / "growth-with-triangles.svg")
+    draw(rows, "snapshots", DOCS / "growth-with-snapshots.svg")
+    page = (DOCS / "performance.md").read_text()
+    before, after = page.split(BEGIN)[0], page.split(END)[1]
+    lines = [f"Machine: {machine}.", "", "| what | figure | spread | naive numpy |", "|---|---|---|---|"]
+    lines += ["| " + " | ".join(cells(row)) + " |" for row in rows]
+    (DOCS / "performance.md").write_text(before + BEGIN + "\n" + "\n".join(lines) + "\n" + END + after)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,39 @@
+"""Worlds to measure in."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from world import Bounds, World
+from world.files import read_world
+
+SUSSEX = Path(__file__).parents[2] / "shared" / "sussex" / "world5000_gray.bin"
+
+
+def everyday() -> tuple[str, World]:
+    """The Sussex world where it is at hand, else one of this project's."""
+    return ("Sussex", read_world(SUSSEX)) if SUSSEX.is_file() else ("tussock-field", World.generate("tussock-field", 1))
+
+
+def blades(n: int) -> World:
+    """A meadow of n blades, 50 to the square metre: the more of them, the more lie far away."""
+    rng = np.random.default_rng(0)
+    side = np.sqrt(n / 50)
+    foot = rng.uniform(0, side, (n, 2))
+    across = 0.02 * np.stack([np.cos(turn := rng.uniform(0, 2 * np.pi, n)), np.sin(turn)], axis=1)
+    triangles = np.zeros((n, 3, 3), dtype=np.float32)
+    triangles[:, 0, :2], triangles[:, 1, :2] = foot - across, foot + across
+    triangles[:, 2, :2], triangles[:, 2, 2] = foot + rng.normal(0, 0.05, (n, 2)), rng.uniform(0.05, 0.5, n)
+    return World(
+        triangles=triangles, rgb=rng.integers(0, 256, (n, 3), dtype=np.uint8), field=Bounds(0, 0, side, side), ground=None,
+        sky_rgb=(200, 220, 255),
+    )  # fmt: skip
+
+
+def poses_in(world: World, n: int, seed: int = 0) -> Float[np.ndarray, "n 3"]:
+    """Random poses in the middle of a world."""
+    rng = np.random.default_rng(seed)
+    x0, y0, x1, y1 = world.field
+    share = rng.uniform(0.1, 0.9, (n, 2))
+    return np.column_stack([x0 + share[:, 0] * (x1 - x0), y0 + share[:, 1] * (y1 - y0), rng.uniform(-np.pi, np.pi, n)])
