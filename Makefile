@@ -28,8 +28,9 @@ format: $(VENV)/developer
 	$(BIN)/ruff format .
 
 bench: $(VENV)/developer  ## what things cost here, beside the naive way, into docs/performance.md; run it with nothing else running
-	$(BIN)/pytest benchmarks -o python_files='bench_*.py' --benchmark-quiet --benchmark-json=$(VENV)/bench.json
-	$(BIN)/python benchmarks/report.py $(VENV)/bench.json
+	for part in views matching walks; do \
+		$(BIN)/pytest benchmarks/bench_$$part.py --benchmark-quiet --benchmark-json=$(VENV)/bench_$$part.json || exit; done
+	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks,$(VENV)/bench_$(part).json)
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -13,7 +13,7 @@ from .findings import Findings, plain, read_findings, write_findings
 from .material import Material
 from .settings import Settings
 
-VERSION = 3  # of the studies: a change that alters what they find counts it up, and what was kept is done again
+VERSION = 4  # of the studies: a change that alters what they find counts it up, and what was kept is done again
 Progress = Callable[[int, int], object]
 
 
