@@ -240,7 +240,7 @@ def _draw(
             c = corners[0, 2, i] - x, corners[1, 2, i] - y, corners[2, 2, i] - z
             opposite = _cross(b, c)
             volume = a[0] * opposite[0] + a[1] * opposite[1] + a[2] * opposite[2]
-            if volume == 0.0 or (cull and volume > 0.0):
+            if abs(volume) < 1e-200 or (cull and volume > 0.0):  # edge-on, or the back
                 continue
             p0, q0, l0, h0 = _bound(_cross(a, b), volume)
             p1, q1, l1, h1 = _bound(opposite, volume)
@@ -262,20 +262,8 @@ def _draw(
                 count += (low <= high) & (wrapped >= start) & (wrapped < stop)
                 if count == _SPANS:
                     _draw_spans(
-                        count,
-                        spans,
-                        lows,
-                        highs,
-                        bases,
-                        slopes,
-                        aboves,
-                        belows,
-                        tangents,
-                        height,
-                        top,
-                        rows_per_rad,
-                        keys,
-                    )
+                        count, spans, lows, highs, bases, slopes, aboves, belows, tangents, height, top, rows_per_rad, keys
+                    )  # fmt: skip
                     count = 0
         _draw_spans(count, spans, lows, highs, bases, slopes, aboves, belows, tangents, height, top, rows_per_rad, keys)
 

@@ -12,7 +12,7 @@ LEAF = 32  # triangles in a box of the lowest level; of 16 to 64 the quickest
 class TriangleTree:
     """A binary tree without pointers: box k holds boxes 2 k and 2 k + 1; the box of all is 1, the lowest are the last half.
 
-    Box `len(boxes) // 2 + i` holds the triangles i LEAF to (i + 1) LEAF - 1. About 44 bytes a triangle.
+    Box `len(boxes) // 2 + i` holds the triangles i LEAF to (i + 1) LEAF - 1. About 47 bytes a triangle.
 
     order: place of each triangle in the world it was made of. corners: x, y, z of the three corners (m).
     boxes: least and greatest x, y, z (m); inf and -inf where a box is empty.
