@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-import torch
 from rich.console import Console
 from rich.table import Table
 
@@ -46,6 +45,8 @@ def draw(rows: list[dict], axis: str, path: Path) -> None:
     for row in rows:
         if row["curve"] and row["curve"][0] == axis:
             curves.setdefault(row["curve"][1], []).append((row["curve"][2], 1000 * row["seconds"]))
+    if not curves:
+        return
     for name, points in curves.items():
         x, y = zip(*sorted(points), strict=True)
         plot.loglog(x, y, "o-", label=name)
@@ -62,7 +63,7 @@ def main(paths: list[Path]) -> None:
     rows = [row for part in parts for row in figures(part)]
     measured = parts[0]
     cpu = measured["machine_info"]["cpu"]
-    machine = f"{cpu.get('brand_raw', measured['machine_info']['processor'])}, {torch.get_num_threads()} cores, no GPU"
+    machine = f"{cpu.get('brand_raw', measured['machine_info']['processor'])}, {cpu['count']} cores"
     table = Table(*HEAD, title=machine)
     for row in rows:
         table.add_row(*cells(row))

@@ -1,8 +1,8 @@
 """The loop: look, scan, turn to the most familiar heading, step."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 import torch
@@ -126,7 +126,7 @@ class Agent:
         for start in starts:
             self._check_inside(start)
         walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
-        with one_torch_thread():
+        with OneTorchThread():
             for index in range(self.step_limit + 1):
                 going = [k for k, walk in enumerate(walks) if not walk.ended]
                 if not going:
@@ -202,15 +202,26 @@ class Agent:
             )
 
 
-@contextmanager
-def one_torch_thread() -> Iterator[None]:
-    """Keep torch to one thread: its others wait for more to do in a way that keeps the cores busy, and the renderer needs them."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
+class OneTorchThread:
+    """While any walk goes on, torch works on one thread: its others wait for more to do in a way that keeps the cores busy, and the
+    renderer needs them. The last walk to end gives torch its threads back.
+    """
+
+    walks, threads = 0, 1
+    lock = Lock()
+
+    def __enter__(self) -> None:
+        with OneTorchThread.lock:
+            if OneTorchThread.walks == 0:
+                OneTorchThread.threads = torch.get_num_threads()
+                torch.set_num_threads(1)
+            OneTorchThread.walks += 1
+
+    def __exit__(self, kind, error, at) -> None:
+        with OneTorchThread.lock:
+            OneTorchThread.walks -= 1
+            if OneTorchThread.walks == 0:
+                torch.set_num_threads(OneTorchThread.threads)
 
 
 class _Walk:

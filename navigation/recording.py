@@ -70,9 +70,11 @@ class Recording:
 
     def close(self) -> None:
         """Write what is left and close the file."""
-        self._flush()
-        for stream in self._streams:
-            stream.disconnect()
+        try:
+            self._flush()
+        finally:
+            for stream in self._streams:
+                stream.disconnect()
 
     def _log(
         self, entity: str, what: rr.AsComponents | Iterable[rr.DescribedComponentBatch], *, static: bool = False
@@ -163,14 +165,13 @@ class Recording:
 
     def _log_constants(self, step: Step) -> None:
         """What steps do not change of what they log."""
-        height, columns, _ = step.view.shape
         width = len(step.familiarity)
-        form = rr.components.ImageFormat(width=columns, height=height, color_model="RGB", channel_datatype="U8")
         self._log("world/agent", rr.Arrows3D.from_fields(colors=PATH_COLOUR, radii=0.012), static=True)
         self._log("world/path", rr.LineStrips3D.from_fields(colors=PATH_COLOUR, radii=0.008), static=True)
-        self._log("view", rr.Image.from_fields(format=form), static=True)
-        if step.match is not None:
-            self._log("recognised", rr.Image.from_fields(format=form), static=True)
+        self._log("view", rr.Image.from_fields(format=_format(step.view.shape[1], step.view.shape[0])), static=True)
+        if step.match is not None and self._renderer is not None:
+            eye = self._renderer.eye
+            self._log("recognised", rr.Image.from_fields(format=_format(eye.width, eye.height)), static=True)
             self._log("world/recognised", rr.Arrows3D.from_fields(colors=MATCH_COLOUR, radii=0.008), static=True)
         degrees_right = -np.degrees(turn_of_columns(_rightwards(width), width))
         chart = rr.BarChart(step.familiarity, abscissa=degrees_right, color=MATCH_COLOUR).as_component_batches()
@@ -263,6 +264,10 @@ def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
 
 def _directions(headings: Float[np.ndarray, " n"], length: float) -> Float[np.ndarray, "n 3"]:
     return length * np.column_stack([np.cos(headings), np.sin(headings), np.zeros(len(headings))])
+
+
+def _format(width: int, height: int) -> rr.components.ImageFormat:
+    return rr.components.ImageFormat(width=width, height=height, color_model="RGB", channel_datatype="U8")
 
 
 def _images(views: UInt8[np.ndarray, "n height width channels"]) -> Iterable[rr.ComponentColumn]:

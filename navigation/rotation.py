@@ -47,12 +47,12 @@ class FilterBank:
         self, views: Float32[torch.Tensor, "n h w"], among: slice | None = None
     ) -> Iterator[tuple[slice, Float32[torch.Tensor, "n w m"]]]:
         """Responses of views to consecutive slices of the filters (those `among`), no more than CHUNK_BYTES of them at once."""
-        n, _, width = views.shape
+        n, height, width = views.shape
         frequencies = width // 2 + 1
         spectra = torch.fft.rfft(views)
         # For each view two rows: one makes the real part of conj(V) F, the other the imaginary part.
         rows = torch.view_as_real(torch.stack([spectra, 1j * spectra]))  # (2, n, h, f, 2)
-        rows = rows.permute(3, 0, 1, 2, 4).reshape(frequencies, 2 * n, -1)
+        rows = rows.permute(3, 0, 1, 2, 4).reshape(frequencies, 2 * n, 2 * height)
         rows[0, :n, 1] = width  # adds the biases to frequency 0, and so to all rotations
         at_once = max(1, CHUNK_BYTES // (8 * width * max(1, n)))
         first, last, _ = (among or slice(None)).indices(len(self))
@@ -62,7 +62,8 @@ class FilterBank:
             transformed = torch.bmm(rows, self.spectra[:, :, part]).reshape(2 * frequencies, n * m)
             if self._inverse is None:
                 halves = transformed.reshape(frequencies, 2, n, m)
-                responses = torch.fft.irfft(torch.complex(halves[:, 0], halves[:, 1]), n=width, dim=0)
+                imaginary = torch.cat([torch.zeros_like(halves[:1, 1]), halves[1:, 1]])
+                responses = torch.fft.irfft(torch.complex(halves[:, 0], imaginary), n=width, dim=0)
             else:
                 responses = product(self._inverse, transformed).reshape(width, n, m)
             yield part, responses.movedim(0, 1)

@@ -9,7 +9,8 @@ The mathematics, for one eye at the origin. In a column every ray shares one azi
   the triangle covers the rows between the highest lower and the lowest upper bound. Triangles that share an edge compute
   the same bound to the last bit, and both own it, so no ray slips between them.
 - Depth. The ray meets the triangle's plane, of normal `N = (b - a) x (c - a)`, at `d D / (N . d)`. So `(N / D) . d` is
-  the inverse of the distance, again linear in t: the depth test is one multiply-add a pixel, and the largest wins.
+  the inverse of the distance, again linear in t: the depth test is one multiply-add a pixel, and the largest wins (rounded to
+  float32; the first of the world's triangles where they are equal).
 
 - What is far away, or hidden. The triangles lie sorted under a tree of boxes (render/tree.py), which is walked from near to far. A box
   is left out where no ray meets its outline, taken a little too wide, or where every pixel that it may touch shows something
@@ -32,7 +33,7 @@ from world.scene import World
 
 from .eye import Eye
 from .renderer import Poses, as_poses
-from .tree import LEAF, TriangleTree
+from .tree import TriangleTree
 
 # atan(x) / x as a polynomial in x^2 on [0, 1], within 2e-7: enough to find candidates, which exact tests follow.
 _x = np.cos(np.pi * (np.arange(200) + 0.5) / 400)
@@ -41,6 +42,7 @@ _A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7 = (
 )
 _ATAN_ERROR = 1e-6
 _MOST_PIXELS = 4096  # that one look whether a box is hidden goes through
+_LEAF = 32  # triangles in a box of the lowest level; of 16 to 64 the quickest
 _SPANS = 512  # spans of rows that are found, then drawn, at once
 
 
@@ -72,10 +74,10 @@ def _row(tangent, top, rows_per_rad):
 def _rows_between(low, high, above, below, tangents, height):
     """First and last row whose tangent lies in [low, high], which `_row` put at `above` and `below`; first > last if there is none."""
     first, last = np.int64(min(max(above, 0.0), float(height))), np.int64(min(max(below, -1.0), height - 1.0))
-    # Both are right or one row too far out.
-    if first < height and tangents[np.uintp(first)] > high:
+    # Both are right or a row too far out (more where rows are finer than the approximation).
+    while first < height and tangents[np.uintp(first)] > high:
         first += 1
-    if last >= 0 and tangents[np.uintp(last)] < low:
+    while last >= 0 and tangents[np.uintp(last)] < low:
         last -= 1
     return first, last
 
@@ -106,18 +108,20 @@ def _cross(a, b):
 @numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _bound(normal, volume):
     """The bound p cos + q sin on t that an edge sets, as (p, q, l, h): l is 0 where it is one from below, h where it is one from
-    above; else they are -inf and inf.
+    above; else they are -inf and inf. A plane that stands upright bounds columns, not t.
     """
     nx, ny, nz = normal
-    nz = 1e-200 if abs(nz) < 1e-200 else nz  # an upright plane: bounds of +-1e200 leave all of a column, or nothing
+    upright = abs(nz) < 1e-200  # bounds of +-1e200 leave all of a column, or nothing; all of one that lies in the plane
+    nz = 1e-200 if upright else nz
+    slack = 1e150 if upright else 0.0
     below = (nz > 0.0) == (volume > 0.0)
     scale = -1.0 / nz
-    return scale * nx, scale * ny, 0.0 if below else -np.inf, np.inf if below else 0.0
+    return scale * nx, scale * ny, -slack if below else -np.inf, np.inf if below else slack
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _find_columns(corners, begin, end, x, y, heading, width, columns, firsts, lasts):
-    """First and last column of triangles begin..end-1 seen from (x, y), see `_column_range`; columns (3, LEAF): scratch."""
+    """First and last column of triangles begin..end-1 seen from (x, y), see `_column_range`; columns (3, _LEAF): scratch."""
     for k in range(3):
         for i in range(end - begin):  # no branches, so that it is vectorised
             columns[k, i] = _column(corners[0, k, begin + i] - x, corners[1, k, begin + i] - y, heading, width)
@@ -200,17 +204,17 @@ def _squared_distance(boxes, k, x, y):
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _draw(
-    corners, boxes, cull, x, y, z, heading, cosines, sines, tangents, height, top, rows_per_rad, start, stop, keys
-):
+    corners, labels, boxes, cull, x, y, z, heading, cosines, sines, tangents, height, top, rows_per_rad, start, stop, keys
+):  # fmt: skip
     """Draw all triangles into columns start..stop-1: into keys (width, height) the `_key` of each pixel's nearest, 0 where is none.
 
     corners (3, 3, n) and boxes as a `TriangleTree` has them; the eye is at x, y, z; cosines, sines (width,) of the columns' azimuths
-    in the world; tangents (height,) of the rows' elevations, which are even from `top` down. Boxes are walked from near to far. A
-    triangle's label is n minus its index.
+    in the world; tangents (height,) of the rows' elevations, which are even from `top` down; labels (n,), over 0, say which triangle
+    it is. Boxes are walked from near to far.
     """
     keys[start:stop] = 0
     width, leaves = keys.shape[0], boxes.shape[0] // 2
-    columns, firsts, lasts = np.empty((3, LEAF)), np.empty(LEAF, np.int64), np.empty(LEAF, np.int64)
+    columns, firsts, lasts = np.empty((3, _LEAF)), np.empty(_LEAF, np.int64), np.empty(_LEAF, np.int64)
     spans, lows, highs = np.empty((2, _SPANS), np.int64), np.empty(_SPANS), np.empty(_SPANS)
     bases, slopes, aboves, belows = np.empty(_SPANS), np.empty(_SPANS), np.empty(_SPANS), np.empty(_SPANS)
     waiting, waits = np.empty(64, np.int64), 1
@@ -227,8 +231,8 @@ def _draw(
             waiting[waits], waiting[waits + 1] = far, near
             waits += 2
             continue
-        begin = (box - leaves) * LEAF
-        end = min(begin + LEAF, corners.shape[2])
+        begin = (box - leaves) * _LEAF
+        end = min(begin + _LEAF, corners.shape[2])
         _find_columns(corners, begin, end, x, y, heading, width, columns, firsts, lasts)
         count = 0
         for i in range(begin, end):
@@ -258,7 +262,7 @@ def _draw(
                 t0, t1, t2 = p0 * cos + q0 * sin, p1 * cos + q1 * sin, p2 * cos + q2 * sin
                 low, high = max(t0 + l0, t1 + l1, t2 + l2), min(t0 + h0, t1 + h1, t2 + h2)
                 lows[count], highs[count], bases[count], slopes[count] = low, high, gx * cos + gy * sin, gz
-                spans[0, count], spans[1, count] = wrapped, corners.shape[2] - i
+                spans[0, count], spans[1, count] = wrapped, labels[i]
                 count += (low <= high) & (wrapped >= start) & (wrapped < stop)
                 if count == _SPANS:
                     _draw_spans(
@@ -300,30 +304,15 @@ def _average(keys, colours, rays, weights, start, stop, view):
 
 @numba.njit(cache=True, nogil=True)
 def _draw_views(
-    corners,
-    boxes,
-    cull,
-    poses,
-    z,
-    azimuths,
-    tangents,
-    top,
-    rows_per_rad,
-    start,
-    stop,
-    keys,
-    colours,
-    rays,
-    weights,
-    views,
-):
+    corners, labels, boxes, cull, poses, z, azimuths, tangents, top, rows_per_rad, start, stop, keys, colours, rays, weights, views
+):  # fmt: skip
     """Columns start..stop-1 of the views (n, height, width) at poses (n, 3); see `_draw` and `_average`."""
     height = views.shape[1] * rays
     for n in range(len(poses)):
         x, y, heading = poses[n]
         around = azimuths + heading
         _draw(
-            corners, boxes, cull, x, y, z, heading, np.cos(around), np.sin(around), tangents, height, top, rows_per_rad,
+            corners, labels, boxes, cull, x, y, z, heading, np.cos(around), np.sin(around), tangents, height, top, rows_per_rad,
             start * rays, stop * rays, keys,
         )  # fmt: skip
         _average(keys, colours, rays, weights, start, stop, views[n])
@@ -341,8 +330,9 @@ class ScanlineRenderer:
         self.world = world
         self.eye = eye
         triangles, rgb = world.surfaces()
-        self._tree = TriangleTree.of(triangles)
-        covered = np.column_stack([rgb, np.full(len(rgb), 255)])[self._tree.order[::-1]]
+        self._tree = TriangleTree.of(triangles, _LEAF)
+        self._labels = len(rgb) - self._tree.order  # of equally near triangles the first is seen; 0 is the sky
+        covered = np.column_stack([rgb, np.full(len(rgb), 255)])[::-1]
         by_label = np.vstack([[*world.sky_rgb, 0], covered]).astype("<u2")
         self._colours = by_label.view("<i8")[:, 0]  # see `_average`
         rays = eye.rays
@@ -381,11 +371,12 @@ class ScanlineRenderer:
     def _render_strip(self, poses: Float[np.ndarray, "n 3"], views: np.ndarray, start: int, stop: int) -> None:
         """Draw columns start..stop-1 of the views at poses."""
         eye, rays, tree = self.eye, self.eye.rays, self._tree
-        keys = (
-            self._scratch.pop() if self._scratch else np.empty((eye.width * rays, len(self._tangents)), dtype=np.int64)
-        )
+        try:
+            keys = self._scratch.pop()
+        except IndexError:
+            keys = np.empty((eye.width * rays, len(self._tangents)), dtype=np.int64)
         _draw_views(
-            tree.corners, tree.boxes, not self.world.double_sided, poses, eye.z, self._azimuths, self._tangents, eye.top,
+            tree.corners, self._labels, tree.boxes, not self.world.double_sided, poses, eye.z, self._azimuths, self._tangents, eye.top,
             self._rows_per_rad, start, stop, keys, self._colours, rays, self._weights, views.view("<u4")[..., 0],
         )  # fmt: skip
         self._scratch.append(keys)  # fresh memory costs more than drawing a small view

@@ -5,29 +5,29 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Int64, UInt64
 
-LEAF = 32  # triangles in a box of the lowest level; of 16 to 64 the quickest
-
 
 @dataclass(frozen=True, kw_only=True)
 class TriangleTree:
     """A binary tree without pointers: box k holds boxes 2 k and 2 k + 1; the box of all is 1, the lowest are the last half.
 
-    Box `len(boxes) // 2 + i` holds the triangles i LEAF to (i + 1) LEAF - 1. About 47 bytes a triangle.
+    Box `len(boxes) // 2 + i` holds the triangles i leaf to (i + 1) leaf - 1. About 47 bytes a triangle.
 
+    leaf: triangles in a box of the lowest level.
     order: place of each triangle in the world it was made of. corners: x, y, z of the three corners (m).
     boxes: least and greatest x, y, z (m); inf and -inf where a box is empty.
     """
 
+    leaf: int
     order: Int64[np.ndarray, " n"]
     corners: Float32[np.ndarray, "3 3 n"]
     boxes: Float32[np.ndarray, "m 6"]
 
     @classmethod
-    def of(cls, triangles: Float32[np.ndarray, "n 3 3"]) -> "TriangleTree":
+    def of(cls, triangles: Float32[np.ndarray, "n 3 3"], leaf: int) -> "TriangleTree":
         """The tree of triangles: neighbours along a Z-curve over the ground share a box."""
         order = np.argsort(_along_z_curve(triangles[:, :, :2].mean(axis=1, dtype=float)), kind="stable")
         corners = np.ascontiguousarray(triangles[order].transpose(2, 1, 0))
-        starts = np.arange(0, len(order), LEAF)
+        starts = np.arange(0, len(order), leaf)
         leaves = 1 << max(0, len(starts) - 1).bit_length()
         boxes = np.tile(np.repeat(np.array([np.inf, -np.inf], dtype=np.float32), 3), (2 * leaves, 1))
         if len(starts):
@@ -37,7 +37,7 @@ class TriangleTree:
             below = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
             leaves //= 2
             boxes[leaves : 2 * leaves] = np.hstack([below[:, :, :3].min(axis=1), below[:, :, 3:].max(axis=1)])
-        return cls(order=order, corners=corners, boxes=boxes)
+        return cls(leaf=leaf, order=order, corners=corners, boxes=boxes)
 
 
 def _along_z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:

@@ -118,7 +118,11 @@ def test_torch_has_its_threads_back_after_a_walk(renderer, route, memory):
     walk = agent(renderer, route, memory).walk(route.start)
     next(walk)
     assert torch.get_num_threads() == 1
+    other = agent(renderer, route, memory).walk(route.start)
+    next(other)
     walk.close()
+    assert torch.get_num_threads() == 1
+    other.close()
     assert torch.get_num_threads() == 2
 
 

@@ -619,3 +619,8 @@ def test_swayed_views_shift_smoothly_around_the_ring_by_as_much_as_asked():
     assert abs(float(shift.mean())) < 0.7
     assert (shift - shift.roll(1, dims=1)).abs().max() < 2.5  # degrees a column, the seam included
     assert torch.equal(swayed(views, 0.0, random), views)
+
+
+def test_perfect_memory_matches_no_views_to_nothing():
+    familiarity, index = PerfectMemory().fit(views(4)).match(views(4)[:0])
+    assert familiarity.shape == index.shape == (0, 24)

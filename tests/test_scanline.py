@@ -12,7 +12,7 @@ from scenes import random_poses, random_world, world_of
 from render.eye import Eye
 from render.renderer import open_renderer
 from render.scanline import ScanlineRenderer
-from render.tree import LEAF, TriangleTree
+from render.tree import TriangleTree
 from world.errors import InputError
 from world.files import read_world
 from world.geometry import column_azimuths
@@ -213,13 +213,13 @@ def test_what_the_tree_leaves_out_changes_no_byte(name):
 def test_every_box_of_the_tree_holds_its_triangles_and_its_parts():
     world = random_world(seed=4, n=1000)
     triangles, _ = world.surfaces()
-    tree = TriangleTree.of(triangles)
+    tree = TriangleTree.of(triangles, 8)
     assert sorted(tree.order) == list(range(len(triangles)))
     assert np.array_equal(tree.corners, triangles[tree.order].transpose(2, 1, 0))
     leaves = len(tree.boxes) // 2
     for k, (*low, x1, y1, z1) in enumerate(tree.boxes):
         if k >= leaves:
-            inside = tree.corners[..., (k - leaves) * LEAF : (k - leaves + 1) * LEAF].reshape(3, -1)
+            inside = tree.corners[..., (k - leaves) * 8 : (k - leaves + 1) * 8].reshape(3, -1)
         elif k >= 1:
             inside = np.hstack([tree.boxes[2 * k : 2 * k + 2, :3].T, tree.boxes[2 * k : 2 * k + 2, 3:].T])
             inside = inside[:, np.isfinite(inside).all(axis=0)]
@@ -228,3 +228,12 @@ def test_every_box_of_the_tree_holds_its_triangles_and_its_parts():
         if inside.size:
             assert (inside.min(axis=1) >= low).all()
             assert (inside.max(axis=1) <= (x1, y1, z1)).all()
+
+
+def test_no_ray_slips_between_triangles_at_an_upright_seam_that_it_lies_in():
+    """Two halves of a wall meet where the eye looks to, along their seam, at the middle column of an odd number."""
+    wall = np.array([[(1, -1, -1), (1, 0, -1), (1, 0, 1)], [(1, 0, -1), (1, 1, -1), (1, 0, 1)]], dtype=np.float32)
+    eye = Eye(width=45, height=21, top=0.5, bottom=-0.5, z=0.0, samples=1)
+    for corners in (wall, wall[:, ::-1], wall * [1, 1, -1]):
+        with open_renderer(world_of(corners, [[9, 9, 9]] * 2, ground=False), eye, "cpu") as opened:
+            assert (opened.render([(0.0, 0.0, 0.0)])[0, :, 22, 3] == 255).all()

@@ -44,7 +44,7 @@ class PerfectMemory(IncrementalModel):
 
     def _prepare(self) -> None:
         # The distance does not change when one number is taken from all pixels; float32 keeps more digits of it around 0.
-        self._exact = self.snapshots.cpu()
+        self._on_cpu = self.snapshots.cpu()
         self._level = self.snapshots.mean()
         centred = self.snapshots - self._level
         self._energies = centred.square().sum(dim=(1, 2))
@@ -55,6 +55,9 @@ class PerfectMemory(IncrementalModel):
 
     def _nearest(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
+        if len(views) == 0:
+            nothing = views.new_empty(0, views.shape[2])
+            return nothing, nothing.long()
         centred = views - self._level
         energies = centred.square().sum(dim=(1, 2))
         best, index = None, None
@@ -65,11 +68,11 @@ class PerfectMemory(IncrementalModel):
                 which = torch.where(nearest < best, which, index)
                 nearest = torch.minimum(nearest, best)
             best, index = nearest, which
-        if best is None or index is None:
-            return views.new_empty(0, views.shape[2]), torch.empty(0, views.shape[2], dtype=torch.int64)
+        assert best is not None
+        assert index is not None
         squared = (best + energies[:, None]).cpu().numpy()
         tolerance = ROUNDING * (energies.cpu().numpy() + float(self._energies[among].max()))
-        _rescore(views.cpu().numpy(), self._exact.numpy(), index.cpu().numpy(), tolerance, squared)
+        _rescore(views.cpu().numpy(), self._on_cpu.numpy(), index.cpu().numpy(), tolerance, squared)
         return self._here(torch.from_numpy(-np.sqrt(squared / np.float32(views[0].numel())))), index
 
 
