@@ -126,7 +126,7 @@ class Agent:
         for start in starts:
             self._check_inside(start)
         walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
-        with OneTorchThread():
+        with _OneTorchThread():
             for index in range(self.step_limit + 1):
                 going = [k for k, walk in enumerate(walks) if not walk.ended]
                 if not going:
@@ -202,7 +202,7 @@ class Agent:
             )
 
 
-class OneTorchThread:
+class _OneTorchThread:
     """While any walk goes on, torch works on one thread: its others wait for more to do in a way that keeps the cores busy, and the
     renderer needs them. The last walk to end gives torch its threads back.
     """
@@ -211,17 +211,17 @@ class OneTorchThread:
     lock = Lock()
 
     def __enter__(self) -> None:
-        with OneTorchThread.lock:
-            if OneTorchThread.walks == 0:
-                OneTorchThread.threads = torch.get_num_threads()
+        with _OneTorchThread.lock:
+            if _OneTorchThread.walks == 0:
+                _OneTorchThread.threads = torch.get_num_threads()
                 torch.set_num_threads(1)
-            OneTorchThread.walks += 1
+            _OneTorchThread.walks += 1
 
     def __exit__(self, kind, error, at) -> None:
-        with OneTorchThread.lock:
-            OneTorchThread.walks -= 1
-            if OneTorchThread.walks == 0:
-                torch.set_num_threads(OneTorchThread.threads)
+        with _OneTorchThread.lock:
+            _OneTorchThread.walks -= 1
+            if _OneTorchThread.walks == 0:
+                torch.set_num_threads(_OneTorchThread.threads)
 
 
 class _Walk:

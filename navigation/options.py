@@ -89,7 +89,9 @@ class SightOptions:
     def open_renderer(self, world):
         from render import open_renderer
 
-        with saying_when_slow("compiling the renderer; this is done once, and takes some seconds"):
+        with saying_when_slow(
+            "opening the renderer; where it is used for the first time, it is compiled, which takes some seconds"
+        ):
             return open_renderer(world, self.eye(), self.renderer)
 
 

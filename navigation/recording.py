@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -96,10 +97,10 @@ class Recording:
         here = np.array([(*step.pose[:2], ABOVE) for step in steps])
         facing = _directions(np.array([step.pose.heading + step.turn for step in steps]), 0.2)
         self._send("world/agent", steps, rr.Arrows3D.columns(origins=here, vectors=facing))
-        before = [self._previous or steps[0], *steps[:-1]]
-        walked = [k for k, step in enumerate(steps) if before[k] is not step and step.reset is None]
-        ways = [[(*before[k].pose[:2], ABOVE), here[k]] for k in walked]
-        self._send("world/path", [steps[k] for k in walked], rr.LineStrips3D.columns(strips=ways))
+        known = steps if self._previous is None else [self._previous, *steps]
+        walked = [(before, step) for before, step in pairwise(known) if step.reset is None]
+        ways = [[(*before.pose[:2], ABOVE), (*step.pose[:2], ABOVE)] for before, step in walked]
+        self._send("world/path", [step for _, step in walked], rr.LineStrips3D.columns(strips=ways))
         self._send("view", steps, _images(np.stack([step.view for step in steps])))
         self._send_matches([step for step in steps if step.match is not None])
         self._send("deviation/m", steps, rr.Scalars.columns(scalars=[step.deviation for step in steps]))
@@ -169,7 +170,7 @@ class Recording:
         self._log("world/agent", rr.Arrows3D.from_fields(colors=PATH_COLOUR, radii=0.012), static=True)
         self._log("world/path", rr.LineStrips3D.from_fields(colors=PATH_COLOUR, radii=0.008), static=True)
         self._log("view", rr.Image.from_fields(format=_format(step.view.shape[1], step.view.shape[0])), static=True)
-        if step.match is not None and self._renderer is not None:
+        if step.match is not None and self._renderer is not None and self._training_poses is not None:
             eye = self._renderer.eye
             self._log("recognised", rr.Image.from_fields(format=_format(eye.width, eye.height)), static=True)
             self._log("world/recognised", rr.Arrows3D.from_fields(colors=MATCH_COLOUR, radii=0.008), static=True)

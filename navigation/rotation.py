@@ -46,7 +46,7 @@ class FilterBank:
     def chunks(
         self, views: Float32[torch.Tensor, "n h w"], among: slice | None = None
     ) -> Iterator[tuple[slice, Float32[torch.Tensor, "n w m"]]]:
-        """Responses of views to consecutive slices of the filters (those `among`), no more than CHUNK_BYTES of them at once."""
+        """Responses of views to consecutive slices of the filters (those `among`): as many at once as CHUNK_BYTES hold, or one."""
         n, height, width = views.shape
         frequencies = width // 2 + 1
         spectra = torch.fft.rfft(views)

@@ -60,16 +60,12 @@ class PerfectMemory(IncrementalModel):
             return nothing, nothing.long()
         centred = views - self._level
         energies = centred.square().sum(dim=(1, 2))
-        best, index = None, None
+        best = torch.full((len(views), views.shape[2]), torch.inf, device=views.device)
+        index = torch.zeros_like(best, dtype=torch.int64)
         for part, distances in self._bank.chunks(centred, among):  # but for |v|^2, which is the same for all
             nearest, which = distances.min(dim=2)
-            which = which + part.start
-            if best is not None and index is not None:
-                which = torch.where(nearest < best, which, index)
-                nearest = torch.minimum(nearest, best)
-            best, index = nearest, which
-        assert best is not None
-        assert index is not None
+            index = torch.where(nearest < best, which + part.start, index)
+            best = torch.minimum(nearest, best)
         squared = (best + energies[:, None]).cpu().numpy()
         tolerance = ROUNDING * (energies.cpu().numpy() + float(self._energies[among].max()))
         _rescore(views.cpu().numpy(), self._on_cpu.numpy(), index.cpu().numpy(), tolerance, squared)
