@@ -15,9 +15,10 @@ from jaxtyping import Bool, Float32, Int64
 
 from world.errors import InputError
 
+from .rotation import at_once
+
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]
-SCAN_AT_ONCE = 64  # views; bounds the memory of a scan
 Learned = dict[str, torch.Tensor]
 Self = TypeVar("Self", bound="Model")
 
@@ -112,7 +113,7 @@ class Model(ABC):
         check_scan(views, self.shape)
         if len(views) == 0:
             return torch.empty(0, views.shape[2])
-        return torch.cat([self._scan(self._here(part)) for part in views.split(SCAN_AT_ONCE)])
+        return torch.cat([self._scan(self._here(part)) for part in at_once(views)])
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
         """Take over what was learned, from training or from a file; where that fails, it knows what it knew.
@@ -263,6 +264,9 @@ def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
 
 def check_finite(views: Images) -> None:
     """Refuse NaN and infinity. Raises InputError."""
-    if not torch.isfinite(views).all():
-        bad = int(torch.nonzero(~torch.isfinite(views).all(dim=(1, 2)))[0, 0])
+    if math.isfinite(views.sum()):  # quicker, but the sum of finite numbers may be infinite
+        return
+    finite = torch.isfinite(views).flatten(start_dim=1).all(dim=1)
+    if not finite.all():
+        bad = int(torch.nonzero(~finite)[0, 0])
         raise InputError(f"view {bad} holds numbers that are not finite; check the encoding")

@@ -5,9 +5,12 @@ filter F with bias b to rotation k of a view V is a circular correlation,
 
     r[k] = b + sum over rows i, columns j of V[i, (j - k) mod w] F[i, j]
 
-By the correlation theorem its Fourier transform along azimuth is `sum over rows of conj(fft(V)) fft(F)`: an rFFT of each image, one
-small matrix product a frequency, and the way back give all w rotations of all views against all filters. Written in real
-numbers, all of it but the rFFT is products of matrices.
+By the correlation theorem its Fourier transform along azimuth is `R = sum over rows of conj(fft(V)) fft(F)`: for each frequency
+one small product of matrices, of all views and all filters. Back from there the real part of R makes what of r is even in k, the
+imaginary part what is odd, which takes half the work: r[k] = even[k] + odd[k] and r[-k] = even[k] - odd[k].
+
+All of it, the transforms too, is products of real matrices, of filters in blocks of a fixed size. These come out the same on any
+number of threads, which FFTs do not.
 """
 
 import math
@@ -17,12 +20,17 @@ from functools import lru_cache
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32
+from torch.nn.functional import pad
 
 from world.errors import InputError
 from world.geometry import turn_of_columns, wrap_angle
 
-CHUNK_BYTES = 16 * 2**20  # bound on the responses held at once; more is slower, as memory then is fresh each time
-WIDE = 360  # columns from which on an inverse FFT beats a product with the matrix of the transform
+BLOCK = 528  # filters that meet views at once, at most; of 250 to 1,000 the quickest
+ROTATIONS = 6144  # of views that meet filters at once: together, they take 50 MB at most
+
+# Large blocks of memory, when freed, go back to the system at once, and come anew page by page, which can take longer than the
+# products they hold. Where the C library is glibc, freeing one of this size makes it keep twice as much for the next time.
+torch.empty(31 * 2**20, dtype=torch.uint8)
 
 
 class FilterBank:
@@ -33,77 +41,157 @@ class FilterBank:
 
     def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
         self.shape = tuple(filters.shape[1:])
-        spectra = torch.view_as_real(torch.fft.rfft(filters))  # (m, h, f, 2)
-        self.spectra: Float32[torch.Tensor, "f parts m"] = spectra.permute(2, 1, 3, 0).flatten(1, 2).contiguous()
-        # The imaginary part of frequency 0 is nothing. The first row's takes the biases; see `chunks`.
-        if biases is not None:
-            self.spectra[0, 1] = biases
-        self._inverse = inverse_transform(self.shape[1]).to(filters.device) if self.shape[1] < WIDE else None
+        self._transform, self._cosines, self._sines = (each.to(filters.device) for each in transforms(self.shape[1]))
+        if biases is None:
+            biases = filters.new_zeros(len(filters))
+        parts = filters.tensor_split(math.ceil(len(filters) / BLOCK)) if len(filters) else []
+        self._sizes = [len(part) for part in parts]
+        self._blocks = [self._block(*each) for each in zip(parts, biases.split(self._sizes), strict=True)]
+
+    def _block(
+        self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]
+    ) -> Float32[torch.Tensor, "f terms padded"]:
+        """Spectra of some filters: for each frequency the real part of every row, the imaginary part, and at frequency 0 the bias.
+
+        Filters of nothing fill it up to an odd multiple of 16: with what is no multiple, oneDNN's results depend on the number of
+        threads, and near powers of two caches collide.
+        """
+        m, height, width = filters.shape
+        more = (16 - m) % 32
+        by_rows = pad(filters.transpose(0, 1), (0, 0, 0, more))
+        spectra = self._spectra(by_rows.flatten(0, 1)).unflatten(2, (height, m + more))
+        bias = pad(biases[None, None], (0, more, 0, 0, 0, width // 2))
+        return torch.cat([*spectra, bias], dim=1)
 
     def __len__(self) -> int:
-        return self.spectra.shape[2]
+        return sum(self._sizes)
 
-    def chunks(
+    def halves(
         self, views: Float32[torch.Tensor, "n h w"], among: slice | None = None
-    ) -> Iterator[tuple[slice, Float32[torch.Tensor, "n w m"]]]:
-        """Responses of views to consecutive slices of the filters (those `among`): as many at once as CHUNK_BYTES hold, or one."""
-        n, height, width = views.shape
-        frequencies = width // 2 + 1
-        spectra = torch.fft.rfft(views)
-        # For each view two rows: one makes the real part of conj(V) F, the other the imaginary part.
-        rows = torch.view_as_real(torch.stack([spectra, 1j * spectra]))  # (2, n, h, f, 2)
-        rows = rows.permute(3, 0, 1, 2, 4).reshape(frequencies, 2 * n, 2 * height)
-        rows[0, :n, 1] = width  # adds the biases to frequency 0, and so to all rotations
-        at_once = max(1, CHUNK_BYTES // (8 * width * max(1, n)))
+    ) -> Iterator[tuple[slice, Float32[torch.Tensor, "half n padded"], Float32[torch.Tensor, "half n padded"]]]:
+        """Consecutive slices of the filters (those `among`) with the even and the odd half of their responses to views, for
+        k = 0 .. w // 2: a view's response is even[k] + odd[k] at rotation k, and even[k] - odd[k] at rotation -k.
+        Behind those of the slice may lie others, of nothing.
+        """
+        rows = self._rows(views)
         first, last, _ = (among or slice(None)).indices(len(self))
-        for start in range(first, last, at_once):
-            part = slice(start, min(start + at_once, last))
-            m = part.stop - start
-            transformed = torch.bmm(rows, self.spectra[:, :, part]).reshape(2 * frequencies, n * m)
-            if self._inverse is None:
-                halves = transformed.reshape(frequencies, 2, n, m)
-                imaginary = torch.cat([torch.zeros_like(halves[:1, 1]), halves[1:, 1]])
-                responses = torch.fft.irfft(torch.complex(halves[:, 0], imaginary), n=width, dim=0)
-            else:
-                responses = product(self._inverse, transformed).reshape(width, n, m)
-            yield part, responses.movedim(0, 1)
+        end = 0
+        for block, size in zip(self._blocks, self._sizes, strict=True):
+            start, end = end, end + size
+            part = slice(max(first, start), min(last, end))
+            if part.start >= part.stop:
+                continue
+            if among is not None:
+                block = block[:, :, part.start - start : part.stop - start]
+            transformed = products(rows, block).unflatten(1, (2, len(views)))
+            even, odd = (
+                product(matrix, half.flatten(1)).unflatten(1, half.shape[1:])
+                for matrix, half in zip((self._cosines, self._sines), transformed.unbind(1), strict=True)
+            )
+            yield part, even, odd
+
+    def _rows(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "f n2 terms"]:
+        """What each frequency of a block is multiplied by: for the real parts of all views' responses, then for the imaginary parts."""
+        n, height, width = views.shape
+        real, imaginary = self._spectra(views.flatten(0, 1)).unflatten(2, (n, height))
+        rows = real.new_zeros(len(real), 2, n, 2 * height + 1)
+        rows[:, 0, :, :height], rows[:, 0, :, height:-1] = real, imaginary
+        rows[:, 1, :, :height], rows[:, 1, :, height:-1] = -imaginary, real
+        rows[0, 0, :, -1] = width  # the bias adds to all rotations
+        return rows.flatten(1, 2)
+
+    def _spectra(self, rows: Float32[torch.Tensor, "n w"]) -> Float32[torch.Tensor, "2 f n"]:
+        """Real and imaginary parts of the rows' Fourier transforms, without rounding where a row is constant."""
+        level = rows[:, :1]
+        spectra = product(self._transform, (rows - level).T).unflatten(0, (2, -1))
+        spectra[0, 0] += rows.shape[1] * level[:, 0]
+        return spectra
+
+    def chunks(self, views: Float32[torch.Tensor, "n h w"]) -> Iterator[tuple[slice, Float32[torch.Tensor, "n w m"]]]:
+        """Consecutive slices of the filters with their responses to views."""
+        for part, even, odd in self.halves(views):
+            both = around(even + odd, even - odd, self.shape[1])
+            yield part, both[..., : part.stop - part.start].movedim(0, 1)
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
         """Responses (view, rotation, filter) all at once."""
-        n, m = len(views), len(self)
-        if n == 0 or m == 0:
-            return torch.empty(n, self.shape[1], m, device=self.spectra.device)
         found = [response for _, response in self.chunks(views)]
-        return found[0] if len(found) == 1 else torch.cat(found, dim=2)
+        if len(found) == 1:
+            return found[0]
+        return torch.cat([views.new_empty(len(views), self.shape[1], 0), *found], dim=2)
 
 
 @lru_cache(maxsize=16)
-def inverse_transform(width: int) -> Float32[torch.Tensor, "{width} parts"]:
-    """The matrix of the inverse rFFT: from the real and the imaginary part of each frequency to `width` values."""
+def transforms(
+    width: int,
+) -> tuple[Float32[torch.Tensor, "parts {width}"], Float32[torch.Tensor, "f f"], Float32[torch.Tensor, "f f"]]:
+    """Matrices of the rFFT, of which all real parts come first, and of the way back: from real parts to the even half of what they
+    stand for, and from imaginary parts to the odd half.
+    """
     frequency = torch.arange(width // 2 + 1, dtype=torch.float64)
+    phase = torch.outer(frequency, torch.arange(width, dtype=torch.float64)) * (2 * math.pi / width)
     weight = torch.where((frequency == 0) | (2 * frequency == width), 1.0, 2.0) / width
-    phase = torch.outer(torch.arange(width, dtype=torch.float64), frequency) * (2 * math.pi / width)
-    return torch.stack([phase.cos() * weight, -phase.sin() * weight], dim=2).reshape(width, -1).float()
+    back = phase.T[: len(frequency)]
+    return torch.cat([phase.cos(), -phase.sin()]).float(), (back.cos() * weight).float(), (-back.sin() * weight).float()
 
 
-class _Product(torch.autograd.Function):
-    """a @ b by oneDNN, which on some processors is thrice as fast as what torch takes by itself; a is a constant."""
+def at_once(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Tensor, "part h w"], ...]:
+    """Views in parts that have ROTATIONS at most; a single view is never parted."""
+    most = max(1, ROTATIONS // views.shape[2])
+    return views.tensor_split(max(1, math.ceil(len(views) / most)))
 
-    @staticmethod
-    def forward(ctx, a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-        ctx.save_for_backward(a)
-        return torch.ops.mkldnn._linear_pointwise(a, b.T, None, "none", [], "")
 
-    @staticmethod
-    def backward(ctx, gradient: torch.Tensor) -> tuple[None, torch.Tensor]:
-        (a,) = ctx.saved_tensors
-        return None, torch.ops.mkldnn._linear_pointwise(a.T, gradient.T, None, "none", [], "")
+def around(
+    left: Float32[torch.Tensor, "half ..."], right: Float32[torch.Tensor, "half ..."], width: int
+) -> Float32[torch.Tensor, "{width} ..."]:
+    """All rotations 0 .. w - 1, of values at rotations 0, 1, .. w // 2 (to the left) and 0, -1, .. -(w // 2)."""
+    return torch.cat([left, right[1 : (width + 1) // 2].flip(0)])
 
 
 def product(a: Float32[torch.Tensor, "i k"], b: Float32[torch.Tensor, "k j"]) -> Float32[torch.Tensor, "i j"]:
     """a @ b, where a is a constant."""
-    fast = a.device.type == "cpu" and torch.backends.mkldnn.is_available()
-    return _Product.apply(a, b) if fast else a @ b
+    if not (_has_onednn(a) and b.numel()):
+        return a @ b
+    return _Product.apply(a, b) if b.requires_grad else _by_onednn(a, b)
+
+
+def products(a: Float32[torch.Tensor, "f i k"], b: Float32[torch.Tensor, "f k j"]) -> Float32[torch.Tensor, "f i j"]:
+    """a[f] @ b[f] of each f, where a is a constant."""
+    i, k, j = *a.shape[1:], b.shape[2]
+    # As a convolution of f groups. Where k is a multiple of 4, it would order b anew at great cost. Small ones are not worth it, and
+    # with few columns they depend on the number of threads.
+    if not (_has_onednn(a) and k % 4 and j >= 64 and i * j >= 4000):
+        return torch.bmm(a, b)
+    return _Product.apply(a, b) if b.requires_grad else _by_onednn(a, b)
+
+
+def _by_onednn(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    """`product` or `products` by oneDNN, which on some processors is thrice as fast as what torch takes by itself."""
+    if a.ndim == 2:
+        b = b if b.T.is_contiguous() else b.contiguous()  # it knows no other strides, and is extremely slow with them
+        return torch.ops.mkldnn._linear_pointwise(a, b.T, None, "none", [], "")
+    (f, i, k), j = a.shape, b.shape[2]
+    return torch.mkldnn_convolution(b.reshape(1, f * k, j), a.reshape(f * i, k, 1), None, [0], [1], [1], f).reshape(
+        f, i, j
+    )
+
+
+class _Product(torch.autograd.Function):
+    """`_by_onednn` with its gradient."""
+
+    @staticmethod
+    def forward(ctx, a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        ctx.save_for_backward(a)
+        return _by_onednn(a, b)
+
+    @staticmethod
+    def backward(ctx, gradient: torch.Tensor) -> tuple[None, torch.Tensor]:
+        (a,) = ctx.saved_tensors
+        return None, (product if a.ndim == 2 else products)(a.mT, gradient)
+
+
+def _has_onednn(tensor: torch.Tensor) -> bool:
+    return tensor.device.type == "cpu" and torch.backends.mkldnn.is_available()
 
 
 def bell(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:
@@ -116,8 +204,10 @@ def smoothed(scans: Float32[torch.Tensor, "n w"], deviation: float) -> Float32[t
     """Each rotation averaged with its neighbours, by a Gaussian with a standard deviation of `deviation` (rad); 0 is as it is."""
     if deviation == 0:
         return scans
-    weights = bell(scans.shape[1], deviation).to(scans.device)
-    return torch.fft.irfft(torch.fft.rfft(scans) * torch.fft.rfft(weights), n=scans.shape[1])
+    width = scans.shape[1]
+    rotation = torch.arange(width)
+    weights = bell(width, deviation)[(rotation[:, None] - rotation) % width]
+    return product(weights.to(scans.device), scans.T).T
 
 
 def scan_window(width: int, angle: float, centre: float = 0.0) -> Bool[np.ndarray, " width"]:

@@ -83,13 +83,13 @@ def test_snapshot_models_say_what_they_recognised(make):
     assert match[:, 0].tolist() == list(range(7))
 
 
-def test_many_snapshots_are_matched_in_chunks(monkeypatch):
-    model, learned = PerfectMemory().fit(views(30)), views(30)
-    scan, match = model.match(learned)
-    monkeypatch.setattr(rotation, "CHUNK_BYTES", 4 * 8 * 24 * 30)  # four snapshots at once
-    chunked_scan, chunked_match = model.match(learned)
-    assert torch.allclose(chunked_scan, scan, atol=1e-4)
-    assert torch.equal(chunked_match, match)
+def test_many_snapshots_are_matched_in_blocks(monkeypatch):
+    learned = views(30)
+    scan, match = PerfectMemory().fit(learned).match(learned)
+    monkeypatch.setattr(rotation, "BLOCK", 4)
+    scan_of_blocks, match_of_blocks = PerfectMemory().fit(learned).match(learned)
+    assert torch.allclose(scan_of_blocks, scan, atol=1e-4)
+    assert torch.equal(match_of_blocks, match)
     assert match[:, 0].tolist() == list(range(30))
 
 

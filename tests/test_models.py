@@ -259,6 +259,18 @@ def test_scanning_changes_nothing(name, trained):
     assert not first.requires_grad
 
 
+def test_a_scan_does_not_depend_on_the_number_of_threads(name, trained):
+    seen, threads = views(40, 1), torch.get_num_threads()
+    try:
+        scans = []
+        for number in (1, 2, 5):
+            torch.set_num_threads(number)
+            scans.append(trained.scan(seen).numpy().tobytes())
+    finally:
+        torch.set_num_threads(threads)
+    assert len(set(scans)) == 1
+
+
 def test_learning_leaves_the_views_as_they_were_given(name):
     given = views(6)
     model = cheap(name).fit(given)

@@ -25,12 +25,30 @@ def test_responses_equal_rolling_and_summing(size, seed):
     assert torch.allclose(FilterBank(filters, biases).responses(views), expected + biases, atol=1e-4)
 
 
-def test_chunks_change_nothing(monkeypatch):
-    views, bank = torch.randn(3, 4, 12), FilterBank(torch.randn(50, 4, 12))
-    whole = bank.responses(views)
-    monkeypatch.setattr(rotation, "CHUNK_BYTES", 5000)
-    assert len(list(bank.chunks(views))) > 1
+def test_blocks_change_nothing(monkeypatch):
+    views, filters = torch.randn(3, 4, 12), torch.randn(50, 4, 12)
+    whole = FilterBank(filters).responses(views)
+    monkeypatch.setattr(rotation, "BLOCK", 16)
+    bank = FilterBank(filters)
+    assert len(list(bank.chunks(views))) == 4
     assert torch.allclose(bank.responses(views), whole, atol=1e-5)
+
+
+@pytest.mark.parametrize("width", [8, 16, 36, 64, 90, 121])
+@pytest.mark.parametrize("m", [1, 7, 40, 127, 600])
+@pytest.mark.parametrize("n", [1, 5, 32])
+def test_responses_do_not_depend_on_the_number_of_threads(width, m, n):
+    random = torch.Generator().manual_seed(m + n)
+    views, filters = torch.randn(n, 5, width, generator=random), torch.randn(m, 5, width, generator=random)
+    threads = torch.get_num_threads()
+    try:
+        responses = []
+        for number in (1, 2, 3, 8):
+            torch.set_num_threads(number)
+            responses.append(FilterBank(filters).responses(views).contiguous().numpy().tobytes())
+    finally:
+        torch.set_num_threads(threads)
+    assert len(set(responses)) == 1
 
 
 def test_the_best_turn_is_left_for_low_rotations_and_right_for_high_ones():
@@ -73,15 +91,6 @@ def test_the_chosen_rotation_lies_in_the_window(seed):
 def test_a_scan_of_no_angle_is_refused(angle):
     with pytest.raises(InputError, match="scan"):
         scan_window(36, angle)
-
-
-def test_wide_views_are_rotated_by_an_fft_and_narrow_ones_by_a_matrix_to_the_same_end(monkeypatch):
-    views, filters, biases = torch.randn(3, 4, 24), torch.randn(7, 4, 24), torch.randn(7)
-    by_matrix = FilterBank(filters, biases).responses(views)
-    monkeypatch.setattr(rotation, "WIDE", 4)
-    by_fft = FilterBank(filters, biases)
-    assert by_fft._inverse is None
-    assert torch.allclose(by_fft.responses(views), by_matrix, atol=1e-4)
 
 
 def test_responses_can_be_learned_from():

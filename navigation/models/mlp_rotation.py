@@ -7,10 +7,10 @@ from itertools import islice
 
 import torch
 from jaxtyping import Float32, Int64
-from torch.nn.functional import log_softmax, relu
+from torch.nn.functional import log_softmax, pad, relu
 
 from ..familiarity import Images, Learned, Model, Scans
-from ..rotation import FilterBank, bell
+from ..rotation import FilterBank, around, bell
 
 
 @dataclass(kw_only=True, eq=False)
@@ -56,12 +56,12 @@ class MLPRotation(Model):
         weights, biases, output = parameters
 
         target = self._here(bell(width, math.radians(self.target_deg)))
-        spread = self._here(views.std())
+        noise = self.noise * float(views.std())
         optimiser = torch.optim.AdamW(parameters, lr=self.rate, weight_decay=self.penalty, fused=True)
         schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: warmth(step / steps))
         for batch in islice(batches(n, self.batch_size, random), steps):
-            noise = self._here(torch.randn(len(batch), height, width, generator=random))
-            seen = swayed(views[self._here(batch)], math.radians(self.sway_deg), random) + self.noise * spread * noise
+            swaying = swayed(views[self._here(batch)], math.radians(self.sway_deg), random)
+            seen = swaying.add_(self._here(torch.randn(swaying.shape, generator=random)), alpha=noise)
             outputs = network_outputs(FilterBank(weights, biases), output, seen)  # (n, w, networks)
             chances = log_softmax(outputs.flatten(start_dim=1), dim=1).reshape(outputs.shape)
             right = chances[torch.arange(len(batch)), :, stretch[batch]]
@@ -92,15 +92,14 @@ def swayed(views: Images, deviation: float, random: torch.Generator) -> Images:
     ahead and behind. Its standard deviation over columns and views is `deviation`. The same generator shifts all devices alike.
     """
     n, _, width = views.shape
-    around = torch.arange(width) * (2 * math.pi / width)
-    shift = torch.zeros(n, width)
-    for wave in (1, 2, 3):
-        size = torch.randn(n, 2, generator=random) * (deviation / math.sqrt(3))
-        shift += size[:, :1] * torch.sin(wave * around) + size[:, 1:] * torch.cos(wave * around)
-    at = torch.arange(width) + shift * (width / (2 * math.pi))
-    column, share = at.floor().long().to(views.device), (at - at.floor()).to(views.device)[:, None]
-    here, next_ = ((column + step).remainder(width)[:, None].expand(views.shape) for step in (0, 1))
-    return views.gather(2, here) * (1 - share) + views.gather(2, next_) * share
+    columns = torch.arange(width)
+    phases = torch.outer(torch.tensor([1, 2, 3]), columns * (2 * math.pi / width))
+    sizes = torch.randn(n, 6, generator=random) * (deviation * width / (2 * math.pi) / math.sqrt(3))
+    at = columns + sizes @ torch.cat([phases.sin(), phases.cos()])
+    whole = at.floor()
+    column, share = whole.long().to(views.device), (at - whole).to(views.device)[:, None]
+    here, beside = (views.gather(2, (column + step).remainder(width)[:, None].expand(views.shape)) for step in (0, 1))
+    return torch.lerp(here, beside, share)
 
 
 def batches(n: int, size: int, random: torch.Generator) -> Iterator[torch.Tensor]:
@@ -118,5 +117,10 @@ def network_outputs(
     bank: FilterBank, output: Float32[torch.Tensor, "networks units"], views: Images
 ) -> Float32[torch.Tensor, "n w networks"]:
     """Output of networks that see the same views; the bank holds the units of all of them, one network after the other."""
-    activity = relu(bank.responses(views)).unflatten(2, output.shape)  # (n, w, networks, units)
-    return torch.einsum("nwsu,su->nws", activity, output)
+    own = torch.eye(len(output), device=output.device)
+    readout = (output[:, :, None] * own[:, None]).flatten(0, 1)  # (units of all networks, networks)
+    sides = [torch.zeros((), device=views.device)] * 2
+    for part, even, odd in bank.halves(views):
+        weights = pad(readout[part], (0, 0, 0, even.shape[2] - (part.stop - part.start)))
+        sides = [side + relu(half) @ weights for side, half in zip(sides, (even + odd, even - odd), strict=True)]
+    return around(*sides, views.shape[2]).movedim(0, 1)

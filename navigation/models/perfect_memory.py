@@ -10,8 +10,9 @@ from jaxtyping import Float32, Int64
 from ..familiarity import Images, IncrementalModel, Learned, Scans, check_scan
 from ..rotation import FilterBank
 
-# float32 correlations of images with norms a and b are off by less than this times a b (measured: 1.4e-7).
-ROUNDING = 4e-6
+# Squared distances, as the bank finds them, are off by less than this times sqrt(w) (|v|^2 + |s|^2) (measured: an eighth of it).
+ROUNDING = 1e-6
+SEARCH = 64  # distances of which the least is found before it is looked where that stands
 
 
 class PerfectMemory(IncrementalModel):
@@ -45,35 +46,84 @@ class PerfectMemory(IncrementalModel):
     def _prepare(self) -> None:
         # The distance does not change when one number is taken from all pixels; float32 keeps more digits of it around 0.
         self._on_cpu = self.snapshots.cpu()
-        self._level = self.snapshots.mean()
+        # The distance does not change when one number is taken from all pixels; float32 keeps more digits of it around 0.
+        self._level = float(self._on_cpu.numpy().mean(dtype=float))
         centred = self.snapshots - self._level
-        self._energies = centred.square().sum(dim=(1, 2))
-        self._bank = FilterBank(-2 * centred, self._energies)  # |v - s|^2 = |s|^2 - 2 v . s + |v|^2
+        self._energies = energies(centred)
+        # |v - s|^2 = |s|^2 - 2 v . s + |v|^2
+        self._bank = FilterBank(-2 * centred, self._here(torch.from_numpy(self._energies)))
 
     def _scan(self, views: Images) -> Scans:
-        return self.match(views)[0]
+        return self._nearest(views, slice(0, len(self.snapshots)))[0]
 
     def _nearest(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
         if len(views) == 0:
             nothing = views.new_empty(0, views.shape[2])
             return nothing, nothing.long()
+        n, _, width = views.shape
         centred = views - self._level
-        energies = centred.square().sum(dim=(1, 2))
-        best = torch.full((len(views), views.shape[2]), torch.inf, device=views.device)
-        index = torch.zeros_like(best, dtype=torch.int64)
-        for part, distances in self._bank.chunks(centred, among):  # but for |v|^2, which is the same for all
-            nearest, which = distances.min(dim=2)
-            index = torch.where(nearest < best, which + part.start, index)
-            best = torch.minimum(nearest, best)
-        squared = (best + energies[:, None]).cpu().numpy()
-        tolerance = ROUNDING * (energies.cpu().numpy() + float(self._energies[among].max()))
-        _rescore(views.cpu().numpy(), self._on_cpu.numpy(), index.cpu().numpy(), tolerance, squared)
-        return self._here(torch.from_numpy(-np.sqrt(squared / np.float32(views[0].numel())))), index
+        squared = np.full((n, width), np.inf, dtype=np.float32)
+        index = np.zeros((n, width), dtype=np.int64)
+        for part, even, odd in self._bank.halves(centred, among):
+            _nearer(even.cpu().numpy(), odd.cpu().numpy(), part.start, part.stop, squared, index)
+        of_views = energies(centred)
+        squared += of_views[:, None]
+        tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max())
+        _rescore(views.cpu().numpy(), self._on_cpu.numpy(), index, tolerance, squared)
+        familiarity = -np.sqrt(squared / np.float32(views[0].numel()))
+        return self._here(torch.from_numpy(familiarity)), self._here(torch.from_numpy(index))
+
+
+def energies(images: Images) -> Float32[np.ndarray, " n"]:
+    """Sum of the squares of each. By numpy: torch's depends on the number of threads."""
+    return images.square().flatten(start_dim=1).cpu().numpy().sum(axis=1)
 
 
 @no_type_check  # or the tests' type checker would wrap it before numba compiles it
 @numba.njit(nogil=True, cache=True)
+def _nearer(even, odd, first, last, squared, index):
+    """Where one of the snapshots first .. last - 1 is nearer than squared (n, w) says, change that, and index (n, w) to it.
+
+    even + odd (half, n, m) are the squared distances from them at rotations 0 .. half - 1, even - odd those at rotations 0, -1, ..
+    See `FilterBank.halves`. Of equally near ones the first is taken.
+    """
+    width, m = squared.shape[1], last - first
+    for k in range(even.shape[0]):
+        for v in range(even.shape[1]):
+            for turn, sign in ((k, np.float32(1)), (width - k if k else 0, np.float32(-1))):
+                least, at = _order(squared[v, turn]), -1
+                for start in range(0, m, SEARCH):
+                    end = min(start + SEARCH, m)
+                    here = _least(even[k, v, start:end], odd[k, v, start:end], sign)
+                    if here < least:
+                        least, at = here, start
+                if at >= 0:
+                    while _order(even[k, v, at] + sign * odd[k, v, at]) != least:
+                        at += 1
+                    squared[v, turn], index[v, turn] = even[k, v, at] + sign * odd[k, v, at], first + at
+
+
+@no_type_check
+@numba.njit(nogil=True, cache=True, inline="always")
+def _order(x):
+    """A whole number that is the greater the greater a float32 is: of these, unlike of floats, many are compared at once."""
+    bits = np.float32(x).view(np.int32)
+    return bits ^ (bits >> 31 & 0x7FFFFFFF)
+
+
+@no_type_check
+@numba.njit(nogil=True, cache=True)
+def _least(even, odd, sign):
+    """The least of even + sign odd, in `_order`."""
+    least = np.int32(0x7FFFFFFF)
+    for i in range(len(even)):
+        least = min(least, _order(even[i] + sign * odd[i]))
+    return least
+
+
+@no_type_check
+@numba.njit(nogil=True, cache=True, fastmath={"reassoc"})
 def _rescore(views, snapshots, index, tolerance, squared):
     """Make the squared distances (n, w) exact that rounding leaves in doubt about being their view's least, and their neighbours."""
     n, height, width = views.shape
@@ -85,8 +135,10 @@ def _rescore(views, snapshots, index, tolerance, squared):
             if doubtful[turn] or doubtful[turn - 1] or doubtful[(turn + 1) % width]:
                 snapshot = snapshots[index[v, turn]]
                 total = 0.0
-                for i in range(height):
-                    for j in range(width):  # the view rolled right by `turn`
-                        total += (np.float64(views[v, i, j - turn]) - snapshot[i, j]) ** 2
+                for i in range(height):  # the view rolled right by `turn`
+                    for j in range(turn):
+                        total += (np.float64(views[v, i, width - turn + j]) - snapshot[i, j]) ** 2
+                    for j in range(width - turn):
+                        total += (np.float64(views[v, i, j]) - snapshot[i, turn + j]) ** 2
                 squared[v, turn] = total
             squared[v, turn] = max(squared[v, turn], np.float32(0.0))
