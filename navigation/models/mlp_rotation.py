@@ -119,8 +119,8 @@ def network_outputs(
     """Output of networks that see the same views; the bank holds the units of all of them, one network after the other."""
     own = torch.eye(len(output), device=output.device)
     readout = (output[:, :, None] * own[:, None]).flatten(0, 1)  # (units of all networks, networks)
-    sides = [torch.zeros((), device=views.device)] * 2
+    left = right = torch.zeros((), device=output.device)
     for part, even, odd in bank.halves(views):
         weights = pad(readout[part], (0, 0, 0, even.shape[2] - (part.stop - part.start)))
-        sides = [side + relu(half) @ weights for side, half in zip(sides, (even + odd, even - odd), strict=True)]
-    return around(*sides, views.shape[2]).movedim(0, 1)
+        left, right = left + relu(even + odd) @ weights, right + relu(even - odd) @ weights
+    return around(left, right, views.shape[2]).movedim(0, 1)
