@@ -56,11 +56,11 @@ class FilterBank:
         Filters of nothing fill it up to an odd multiple of 16: with what is no multiple, oneDNN's results depend on the number of
         threads, and near powers of two caches collide.
         """
-        m, height, width = filters.shape
+        m, height, _ = filters.shape
         more = (16 - m) % 32
         by_rows = pad(filters.transpose(0, 1), (0, 0, 0, more))
         spectra = self._spectra(by_rows.flatten(0, 1)).unflatten(2, (height, m + more))
-        bias = pad(biases[None, None], (0, more, 0, 0, 0, width // 2))
+        bias = pad(biases[None, None], (0, more, 0, 0, 0, spectra.shape[1] - 1))
         return torch.cat([*spectra, bias], dim=1)
 
     def __len__(self) -> int:
@@ -81,7 +81,7 @@ class FilterBank:
             part = slice(max(first, start), min(last, end))
             if part.start >= part.stop:
                 continue
-            if among is not None:
+            if part.stop - part.start < size:
                 block = block[:, :, part.start - start : part.stop - start]
             transformed = products(rows, block).unflatten(1, (2, len(views)))
             even, odd = (

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float32, Int64
 
 from ..familiarity import Images, IncrementalModel, Learned, Scans, check_scan
-from ..rotation import FilterBank
+from ..rotation import FilterBank, at_once
 
 # Squared distances, as the bank finds them, are off by less than this times sqrt(w) (|v|^2 + |s|^2) (measured: an eighth of it).
 ROUNDING = 1e-6
@@ -32,7 +32,9 @@ class PerfectMemory(IncrementalModel):
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
         check_scan(views, self.shape)
-        return self._nearest(self._here(views), slice(0, len(self.snapshots)))
+        found = [self._nearest(self._here(part), slice(0, len(self.snapshots))) for part in at_once(views)]
+        familiarity, index = (torch.cat(parts) for parts in zip(*found, strict=True))
+        return familiarity, index
 
     def _begin(self, height: int, width: int) -> Learned:
         return {"snapshots": torch.empty(0, height, width, device=self.device)}
@@ -44,7 +46,6 @@ class PerfectMemory(IncrementalModel):
         return {"snapshots": (None, height, width)}
 
     def _prepare(self) -> None:
-        # The distance does not change when one number is taken from all pixels; float32 keeps more digits of it around 0.
         self._on_cpu = self.snapshots.cpu()
         # The distance does not change when one number is taken from all pixels; float32 keeps more digits of it around 0.
         self._level = float(self._on_cpu.numpy().mean(dtype=float))
