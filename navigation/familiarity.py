@@ -186,7 +186,7 @@ class Model(ABC):
             )
             if not fits:
                 raise InputError(f"{self.name}: {key} of shape {tuple(tensor.shape)}, not {expected[key]}")
-            if not torch.isfinite(tensor).all():
+            if not all_finite(tensor):
                 raise InputError(
                     f"{self.name}: the {key} are not finite; if they grew without bound, give a lower rate"
                 )
@@ -264,9 +264,11 @@ def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
 
 def check_finite(views: Images) -> None:
     """Refuse NaN and infinity. Raises InputError."""
-    if math.isfinite(views.sum()):  # quicker, but the sum of finite numbers may be infinite
-        return
-    finite = torch.isfinite(views).flatten(start_dim=1).all(dim=1)
-    if not finite.all():
-        bad = int(torch.nonzero(~finite)[0, 0])
+    if not all_finite(views):
+        bad = int(torch.nonzero(~torch.isfinite(views).flatten(start_dim=1).all(dim=1))[0, 0])
         raise InputError(f"view {bad} holds numbers that are not finite; check the encoding")
+
+
+def all_finite(tensor: torch.Tensor) -> bool:
+    """Whether all numbers are finite. Their sum says so quickly, but may be infinite where they are not."""
+    return math.isfinite(tensor.sum()) or bool(torch.isfinite(tensor).all())
