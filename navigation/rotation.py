@@ -25,8 +25,8 @@ from torch.nn.functional import pad
 from world.errors import InputError
 from world.geometry import turn_of_columns, wrap_angle
 
-BLOCK = 528  # filters that meet views at once, at most; of 250 to 1,000 the quickest
-ROTATIONS = 6144  # of views that meet filters at once: together, they take 50 MB at most
+BLOCK = 1040  # filters that meet views at once, at most: smaller blocks have more to begin, larger ones no longer fit in caches
+ROTATIONS = 6144  # of views that meet filters at once; all that is held on the way is then 100 MB at most
 
 # Large blocks of memory, when freed, go back to the system at once, and come anew page by page, which can take longer than the
 # products they hold. Where the C library is glibc, freeing one of this size makes it keep twice as much for the next time.
