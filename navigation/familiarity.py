@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float32, Int64
 
 from world.errors import InputError
 
-from .rotation import at_once
+from .rotation import in_parts
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]
@@ -113,7 +113,7 @@ class Model(ABC):
         check_scan(views, self.shape)
         if len(views) == 0:
             return torch.empty(0, views.shape[2])
-        return torch.cat([self._scan(self._here(part)) for part in at_once(views)])
+        return torch.cat([self._scan(self._here(part)) for part in in_parts(views)])
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
         """Take over what was learned, from training or from a file; where that fails, it knows what it knew.
@@ -270,5 +270,5 @@ def check_finite(views: Images) -> None:
 
 
 def all_finite(tensor: torch.Tensor) -> bool:
-    """Whether all numbers are finite. Their sum says so quickly, but may be infinite where they are not."""
+    """Whether all numbers are finite. Their sum says so quickly, but it can overflow."""
     return math.isfinite(tensor.sum()) or bool(torch.isfinite(tensor).all())

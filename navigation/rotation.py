@@ -19,17 +19,17 @@ from functools import lru_cache
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Shaped
 from torch.nn.functional import pad
 
 from world.errors import InputError
 from world.geometry import turn_of_columns, wrap_angle
 
-BLOCK = 1040  # filters that meet views at once, at most: smaller blocks have more to begin, larger ones no longer fit in caches
-ROTATIONS = 6144  # of views that meet filters at once; all that is held on the way is then 100 MB at most
+BLOCK = 1040  # filters that meet views at once, at most: smaller blocks have more to begin, larger ones do not fit in caches
+ROTATIONS = 6144  # of views that meet filters at once; what is held on the way is then 100 MB or so
 
-# Large blocks of memory, when freed, go back to the system at once, and come anew page by page, which can take longer than the
-# products they hold. Where the C library is glibc, freeing one of this size makes it keep twice as much for the next time.
+# Much memory, when freed, goes back to the system at once, and comes anew page by page, which can take longer than the products
+# that it holds. Freeing this much once makes glibc keep up to 62 MB of freed memory, in this process, for the next time.
 torch.empty(31 * 2**20, dtype=torch.uint8)
 
 
@@ -53,14 +53,14 @@ class FilterBank:
     ) -> Float32[torch.Tensor, "f terms padded"]:
         """Spectra of some filters: for each frequency the real part of every row, the imaginary part, and at frequency 0 the bias.
 
-        Filters of nothing fill it up to an odd multiple of 16: with what is no multiple, oneDNN's results depend on the number of
+        Zero filters fill it up to an odd multiple of 16: with what is no multiple, oneDNN's results depend on the number of
         threads, and near powers of two caches collide.
         """
         m, height, _ = filters.shape
-        more = (16 - m) % 32
-        by_rows = pad(filters.transpose(0, 1), (0, 0, 0, more))
-        spectra = self._spectra(by_rows.flatten(0, 1)).unflatten(2, (height, m + more))
-        bias = pad(biases[None, None], (0, more, 0, 0, 0, spectra.shape[1] - 1))
+        padding = (16 - m) % 32
+        by_rows = pad(filters.transpose(0, 1), (0, 0, 0, padding))
+        spectra = self._spectra(by_rows.flatten(0, 1)).unflatten(2, (height, m + padding))
+        bias = pad(biases[None, None], (0, padding, 0, 0, 0, spectra.shape[1] - 1))
         return torch.cat([*spectra, bias], dim=1)
 
     def __len__(self) -> int:
@@ -71,9 +71,9 @@ class FilterBank:
     ) -> Iterator[tuple[slice, Float32[torch.Tensor, "half n padded"], Float32[torch.Tensor, "half n padded"]]]:
         """Consecutive slices of the filters (those `among`) with the even and the odd half of their responses to views, for
         k = 0 .. w // 2: a view's response is even[k] + odd[k] at rotation k, and even[k] - odd[k] at rotation -k.
-        Behind those of the slice may lie others, of nothing.
+        The last dimension may be longer than the slice: what follows are zeros. No gradient reaches the views.
         """
-        rows = self._rows(views)
+        rows = self._rows(views).detach()
         first, last, _ = (among or slice(None)).indices(len(self))
         end = 0
         for block, size in zip(self._blocks, self._sizes, strict=True):
@@ -83,11 +83,9 @@ class FilterBank:
                 continue
             if part.stop - part.start < size:
                 block = block[:, :, part.start - start : part.stop - start]
-            transformed = products(rows, block).unflatten(1, (2, len(views)))
-            even, odd = (
-                product(matrix, half.flatten(1)).unflatten(1, half.shape[1:])
-                for matrix, half in zip((self._cosines, self._sines), transformed.unbind(1), strict=True)
-            )
+            real, imaginary = products(rows, block).unflatten(1, (2, len(views))).unbind(1)
+            even = product(self._cosines, real.flatten(1)).unflatten(1, real.shape[1:])
+            odd = product(self._sines, imaginary.flatten(1)).unflatten(1, real.shape[1:])
             yield part, even, odd
 
     def _rows(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "f n2 terms"]:
@@ -101,7 +99,7 @@ class FilterBank:
         return rows.flatten(1, 2)
 
     def _spectra(self, rows: Float32[torch.Tensor, "n w"]) -> Float32[torch.Tensor, "2 f n"]:
-        """Real and imaginary parts of the rows' Fourier transforms, without rounding where a row is constant."""
+        """Real and imaginary parts of the rows' Fourier transforms; of a constant row exactly 0 but for frequency 0."""
         level = rows[:, :1]
         spectra = product(self._transform, (rows - level).T).unflatten(0, (2, -1))
         spectra[0, 0] += rows.shape[1] * level[:, 0]
@@ -110,7 +108,7 @@ class FilterBank:
     def chunks(self, views: Float32[torch.Tensor, "n h w"]) -> Iterator[tuple[slice, Float32[torch.Tensor, "n w m"]]]:
         """Consecutive slices of the filters with their responses to views."""
         for part, even, odd in self.halves(views):
-            both = around(even + odd, even - odd, self.shape[1])
+            both = all_rotations(even + odd, even - odd, self.shape[1])
             yield part, both[..., : part.stop - part.start].movedim(0, 1)
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
@@ -131,19 +129,19 @@ def transforms(
     frequency = torch.arange(width // 2 + 1, dtype=torch.float64)
     phase = torch.outer(frequency, torch.arange(width, dtype=torch.float64)) * (2 * math.pi / width)
     weight = torch.where((frequency == 0) | (2 * frequency == width), 1.0, 2.0) / width
-    back = phase.T[: len(frequency)]
+    back = phase[:, : len(frequency)]
     return torch.cat([phase.cos(), -phase.sin()]).float(), (back.cos() * weight).float(), (-back.sin() * weight).float()
 
 
-def at_once(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Tensor, "part h w"], ...]:
+def in_parts(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Tensor, "part h w"], ...]:
     """Views in parts that have ROTATIONS at most; a single view is never parted."""
     most = max(1, ROTATIONS // views.shape[2])
     return views.tensor_split(max(1, math.ceil(len(views) / most)))
 
 
-def around(
-    left: Float32[torch.Tensor, "half ..."], right: Float32[torch.Tensor, "half ..."], width: int
-) -> Float32[torch.Tensor, "{width} ..."]:
+def all_rotations(
+    left: Shaped[torch.Tensor, "half ..."], right: Shaped[torch.Tensor, "half ..."], width: int
+) -> Shaped[torch.Tensor, "{width} ..."]:
     """All rotations 0 .. w - 1, of values at rotations 0, 1, .. w // 2 (to the left) and 0, -1, .. -(w // 2)."""
     return torch.cat([left, right[1 : (width + 1) // 2].flip(0)])
 
@@ -158,8 +156,8 @@ def product(a: Float32[torch.Tensor, "i k"], b: Float32[torch.Tensor, "k j"]) ->
 def products(a: Float32[torch.Tensor, "f i k"], b: Float32[torch.Tensor, "f k j"]) -> Float32[torch.Tensor, "f i j"]:
     """a[f] @ b[f] of each f, where a is a constant."""
     i, k, j = *a.shape[1:], b.shape[2]
-    # As a convolution of f groups. Where k is a multiple of 4, it would order b anew at great cost. Small ones are not worth it, and
-    # with few columns they depend on the number of threads.
+    # As a convolution of f groups. Where k is a multiple of 4, as it can be for gradients, oneDNN would order b anew at great cost.
+    # Small ones are not worth it, and with few columns they depend on the number of threads.
     if not (_has_onednn(a) and k % 4 and j >= 64 and i * j >= 4000):
         return torch.bmm(a, b)
     return _Product.apply(a, b) if b.requires_grad else _by_onednn(a, b)

@@ -30,6 +30,7 @@ from navigation.models import (
     PerfectMemory,
     VisualCompass,
     make_model,
+    perfect_memory,
 )
 from navigation.models.adaboost import best_stump, haar_filters
 from navigation.models.infomax import RATES, infomax_update
@@ -81,6 +82,21 @@ def test_snapshot_models_say_what_they_recognised(make):
     assert isinstance(make(), SnapshotModel)
     _, match = make().fit(views(7)).match(views(7))
     assert match[:, 0].tolist() == list(range(7))
+
+
+@pytest.mark.parametrize("width", [7, 8])
+def test_another_device_finds_the_same_nearest(width):
+    """Its way of finding them, on the CPU."""
+    halves = torch.randn(2, width // 2 + 1, 3, 48, generator=torch.Generator().manual_seed(width))
+    halves[1, 0] = 0  # at rotation 0 there is no odd half, nor at half a turn
+    halves[1, width / 2 == torch.arange(width // 2 + 1)] = 0
+    found = []
+    for update, tensors in ((perfect_memory._nearer, halves.numpy()), (perfect_memory._nearer_on_device, halves)):
+        squared, index = np.full((3, width), 0.5, dtype=np.float32), np.full((3, width), 7)
+        for first, last in ((0, 40), (40, 41)):
+            update(*tensors, first, last, squared, index)
+        found.append((squared.tolist(), index.tolist()))
+    assert found[0] == found[1]
 
 
 def test_many_snapshots_are_matched_in_blocks(monkeypatch):

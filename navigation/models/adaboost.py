@@ -12,7 +12,7 @@ from jaxtyping import Float32, Float64, UInt8
 from world.geometry import columns_of_turn
 
 from ..familiarity import Images, Learned, Model, Scans
-from ..rotation import FilterBank, at_once
+from ..rotation import FilterBank, in_parts
 
 NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a threshold unit is sought
 THRESHOLDS = 63  # tried for a filter: quantiles of its responses
@@ -90,7 +90,7 @@ class AdaBoost(Model):
         away = torch.arange(width, device=views.device)
         wrong = torch.minimum(away, width - away) * (360 / width) >= self.apart_deg
         bank = FilterBank(learned["filters"])
-        scan = torch.cat([votes(bank, learned, part) for part in at_once(views)]).where(wrong, -torch.inf)
+        scan = torch.cat([votes(bank, learned, part) for part in in_parts(views)]).where(wrong, -torch.inf)
         turns = scan.topk(min(self.mined, int(wrong.sum())), dim=1).indices.tolist()
         return torch.stack([view.roll(k, dims=-1) for view, ks in zip(views, turns, strict=True) for k in ks])
 

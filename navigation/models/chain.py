@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float32, Int64
 
 from ..familiarity import check_scan
 from ..rotation import FilterBank
-from .perfect_memory import PerfectMemory
+from .perfect_memory import PerfectMemory, energies
 
 SAMPLE = 32  # snapshots between which the usual difference of unrelated places is measured
 
@@ -39,9 +39,9 @@ class Chain(PerfectMemory):
         super()._prepare()
         pick = torch.linspace(0, len(self.snapshots) - 1, min(SAMPLE, len(self.snapshots))).round().long()
         sample = self.snapshots[pick] - self._level
-        energies = sample.square().sum(dim=(1, 2))
+        squares = self._here(torch.from_numpy(energies(sample)))
         correlation = FilterBank(sample).responses(sample).amax(dim=1)
-        squared = (energies[:, None] + energies - 2 * correlation)[
+        squared = (squares[:, None] + squares - 2 * correlation)[
             torch.triu_indices(len(sample), len(sample), 1).unbind()
         ]
         rms = (squared.clamp(min=0) / sample[0].numel()).sqrt()

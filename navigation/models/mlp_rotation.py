@@ -10,7 +10,7 @@ from jaxtyping import Float32, Int64
 from torch.nn.functional import log_softmax, pad, relu
 
 from ..familiarity import Images, Learned, Model, Scans
-from ..rotation import FilterBank, around, bell
+from ..rotation import FilterBank, all_rotations, bell
 
 
 @dataclass(kw_only=True, eq=False)
@@ -123,4 +123,4 @@ def network_outputs(
     for part, even, odd in bank.halves(views):
         weights = pad(readout[part], (0, 0, 0, even.shape[2] - (part.stop - part.start)))
         left, right = left + relu(even + odd) @ weights, right + relu(even - odd) @ weights
-    return around(left, right, views.shape[2]).movedim(0, 1)
+    return all_rotations(left, right, views.shape[2]).movedim(0, 1)

@@ -8,9 +8,9 @@ import torch
 from jaxtyping import Float32, Int64
 
 from ..familiarity import Images, IncrementalModel, Learned, Scans, check_scan
-from ..rotation import FilterBank, at_once
+from ..rotation import FilterBank, all_rotations, in_parts
 
-# Squared distances, as the bank finds them, are off by less than this times sqrt(w) (|v|^2 + |s|^2) (measured: an eighth of it).
+# Squared distances, as the bank finds them, are off by less than this times sqrt(w) (|v|^2 + |s|^2) (measured: a quarter of it).
 ROUNDING = 1e-6
 SEARCH = 64  # distances of which the least is found before it is looked where that stands
 
@@ -32,7 +32,7 @@ class PerfectMemory(IncrementalModel):
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
         check_scan(views, self.shape)
-        found = [self._nearest(self._here(part), slice(0, len(self.snapshots))) for part in at_once(views)]
+        found = [self._nearest(self._here(part), slice(0, len(self.snapshots))) for part in in_parts(views)]
         familiarity, index = (torch.cat(parts) for parts in zip(*found, strict=True))
         return familiarity, index
 
@@ -67,7 +67,10 @@ class PerfectMemory(IncrementalModel):
         squared = np.full((n, width), np.inf, dtype=np.float32)
         index = np.zeros((n, width), dtype=np.int64)
         for part, even, odd in self._bank.halves(centred, among):
-            _nearer(even.cpu().numpy(), odd.cpu().numpy(), part.start, part.stop, squared, index)
+            if centred.device.type == "cpu":
+                _nearer(even.numpy(), odd.numpy(), part.start, part.stop, squared, index)
+            else:
+                _nearer_on_device(even, odd, part.start, part.stop, squared, index)
         of_views = energies(centred)
         squared += of_views[:, None]
         tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max())
@@ -101,9 +104,20 @@ def _nearer(even, odd, first, last, squared, index):
                     if here < least:
                         least, at = here, start
                 if at >= 0:
-                    while _order(even[k, v, at] + sign * odd[k, v, at]) != least:
+                    while at < m - 1 and _order(even[k, v, at] + sign * odd[k, v, at]) != least:
                         at += 1
                     squared[v, turn], index[v, turn] = even[k, v, at] + sign * odd[k, v, at], first + at
+
+
+def _nearer_on_device(
+    even: torch.Tensor, odd: torch.Tensor, first: int, last: int, squared: np.ndarray, index: np.ndarray
+) -> None:
+    """`_nearer`, of tensors on another device, of which only the nearest are fetched."""
+    left, right = ((even + sign * odd)[..., : last - first].min(dim=2) for sign in (1, -1))
+    values = all_rotations(left.values, right.values, squared.shape[1]).T.cpu().numpy()
+    which = all_rotations(left.indices, right.indices, squared.shape[1]).T.cpu().numpy()
+    nearer = values < squared
+    squared[nearer], index[nearer] = values[nearer], first + which[nearer]
 
 
 @no_type_check
