@@ -9,8 +9,8 @@ By the correlation theorem its Fourier transform along azimuth is `R = sum over 
 one small product of matrices, of all views and all filters. Back from there the real part of R makes what of r is even in k, the
 imaginary part what is odd, which takes half the work: r[k] = even[k] + odd[k] and r[-k] = even[k] - odd[k].
 
-All of it, the transforms too, is products of real matrices, of filters in blocks of a fixed size. These come out the same on any
-number of threads, which FFTs do not.
+All of it, the transforms too, is products of real matrices, in shapes whose results were found to be the same on any number of
+threads, which those of FFTs are not. Tests compare the bytes.
 """
 
 import math
@@ -25,7 +25,9 @@ from torch.nn.functional import pad
 from world.errors import InputError
 from world.geometry import turn_of_columns, wrap_angle
 
-BLOCK = 1040  # filters that meet views at once, at most: smaller blocks have more to begin, larger ones do not fit in caches
+BLOCK = (
+    1040  # filters that meet views at once, at most: smaller blocks have more to begin, larger ones hold more memory
+)
 ROTATIONS = 6144  # of views that meet filters at once; what is held on the way is then 100 MB or so
 
 # Much memory, when freed, goes back to the system at once, and comes anew page by page, which can take longer than the products
@@ -105,15 +107,15 @@ class FilterBank:
         spectra[0, 0] += rows.shape[1] * level[:, 0]
         return spectra
 
-    def chunks(self, views: Float32[torch.Tensor, "n h w"]) -> Iterator[tuple[slice, Float32[torch.Tensor, "n w m"]]]:
-        """Consecutive slices of the filters with their responses to views."""
+    def chunks(self, views: Float32[torch.Tensor, "n h w"]) -> Iterator[Float32[torch.Tensor, "n w m"]]:
+        """Responses (view, rotation, filter) to one block of the filters after the other."""
         for part, even, odd in self.halves(views):
             both = all_rotations(even + odd, even - odd, self.shape[1])
-            yield part, both[..., : part.stop - part.start].movedim(0, 1)
+            yield both[..., : part.stop - part.start].movedim(0, 1)
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
         """Responses (view, rotation, filter) all at once."""
-        found = [response for _, response in self.chunks(views)]
+        found = list(self.chunks(views))
         if len(found) == 1:
             return found[0]
         return torch.cat([views.new_empty(len(views), self.shape[1], 0), *found], dim=2)

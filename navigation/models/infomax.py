@@ -61,7 +61,7 @@ class Infomax(IncrementalModel):
 
     def _scan(self, views: Images) -> Scans:
         total = torch.zeros(len(views), views.shape[2], device=views.device)
-        for _, responses in self._bank.chunks(views):
+        for responses in self._bank.chunks(views):
             total -= responses.abs().sum(dim=2)
         return total
 

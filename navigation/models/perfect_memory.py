@@ -59,10 +59,7 @@ class PerfectMemory(IncrementalModel):
 
     def _nearest(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
-        if len(views) == 0:
-            nothing = views.new_empty(0, views.shape[2])
-            return nothing, nothing.long()
-        n, _, width = views.shape
+        n, height, width = views.shape
         centred = views - self._level
         squared = np.full((n, width), np.inf, dtype=np.float32)
         index = np.zeros((n, width), dtype=np.int64)
@@ -75,7 +72,7 @@ class PerfectMemory(IncrementalModel):
         squared += of_views[:, None]
         tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max())
         _rescore(views.cpu().numpy(), self._on_cpu.numpy(), index, tolerance, squared)
-        familiarity = -np.sqrt(squared / np.float32(views[0].numel()))
+        familiarity = -np.sqrt(squared / np.float32(height * width))
         return self._here(torch.from_numpy(familiarity)), self._here(torch.from_numpy(index))
 
 
