@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from threading import Lock
 
 import numpy as np
 import torch
@@ -15,6 +14,7 @@ from world.geometry import Pose, Route, columns_of_turn, wrap_angle
 from .encoding import Encoding
 from .familiarity import FamiliarityModel, SequenceModel, SnapshotModel
 from .rotation import best_turn, scan_window
+from .threads import OneTorchThread
 
 # Why a walk ends. The first is success.
 ARRIVED, LOST, STUCK, OUT_OF_WORLD, OUT_OF_STEPS = (
@@ -54,24 +54,20 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Agent:
-    """Follows a route by familiarity.
+class Rules:
+    """How an agent walks, and when a walk ends.
 
     step_length (m). scan: width of the scan (rad), about the present heading, or about the world direction `scan_about` (rad).
-    heading_noise: standard deviation of the normal noise on every turn (rad).
+    heading_noise: standard deviation of the normal noise on every turn (rad), drawn from `seed`.
     arrive: the walk is done within this distance of the route's end (m); where the route ends as near to its start, once the
     agent has been farther away.
     lost: farther than this from the route is lost (m). patience: metres walked without getting farther along the route before
     the agent counts as stuck. max_steps: None takes as many as walk the route's length three times.
     reset_when_lost: instead of ending the walk, put a lost, stuck or straying agent back on the route at the waypoint after the
-    furthest one reached, facing along it, as Ardin et al. (2016) count errors.
-    How far along the route the agent is, is where the route is nearest: a route that crosses itself can be cut short there.
+    furthest one reached, facing along it, as Ardin et al. (2016) count errors. waypoint_spacing (m).
+    Raises InputError for what is no distance, angle or number of steps.
     """
 
-    renderer: Renderer
-    encoding: Encoding
-    model: FamiliarityModel
-    route: Route
     step_length: float = 0.05
     scan: float = np.pi
     scan_about: float | None = None
@@ -98,6 +94,19 @@ class Agent:
             )
         if self.max_steps is not None and self.max_steps < 1:
             raise InputError(f"at most {self.max_steps} steps; give at least 1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agent(Rules):
+    """Follows a route by familiarity, under rules.
+
+    How far along the route the agent is, is where the route is nearest: a route that crosses itself can be cut short there.
+    """
+
+    renderer: Renderer
+    encoding: Encoding
+    model: FamiliarityModel
+    route: Route
 
     @property
     def step_limit(self) -> int:
@@ -126,7 +135,7 @@ class Agent:
         for start in starts:
             self._check_inside(start)
         walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
-        with _OneTorchThread():
+        with OneTorchThread():
             for index in range(self.step_limit + 1):
                 going = [k for k, walk in enumerate(walks) if not walk.ended]
                 if not going:
@@ -200,28 +209,6 @@ class Agent:
             raise InputError(
                 f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
             )
-
-
-class _OneTorchThread:
-    """While any walk goes on, torch works on one thread: its others wait for more to do in a way that keeps the cores busy, and the
-    renderer needs them. The last walk to end gives torch its threads back.
-    """
-
-    walks, threads = 0, 1
-    lock = Lock()
-
-    def __enter__(self) -> None:
-        with _OneTorchThread.lock:
-            if _OneTorchThread.walks == 0:
-                _OneTorchThread.threads = torch.get_num_threads()
-                torch.set_num_threads(1)
-            _OneTorchThread.walks += 1
-
-    def __exit__(self, kind, error, at) -> None:
-        with _OneTorchThread.lock:
-            _OneTorchThread.walks -= 1
-            if _OneTorchThread.walks == 0:
-                torch.set_num_threads(_OneTorchThread.threads)
 
 
 class _Walk:

@@ -5,16 +5,20 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from world.errors import InputError
 
-from .options import FILE_SUFFIX, LearningOptions, RouteOptions
+from .learning_options import FILE_SUFFIX, LearningOptions, Lesson, RunOptions
+from .options import RouteOptions
 from .terminal import progress, say
 
-NOT_SETTINGS = ("out", "overwrite", "live", "viewer", "json")  # flags of a run that do not change what happens in it
+if TYPE_CHECKING:
+    import numpy as np
+
+    from render.renderer import Renderer
 
 
 @dataclass
@@ -41,7 +45,7 @@ class EvaluateCommand(LearningOptions):
         lesson = self.prepare()
         positions = grid_positions(lesson.route, grid=self.grid_m, within=self.within_m, field=lesson.world.field)
         with self.open_renderer(lesson.world) as renderer:
-            learned = lesson.teach(renderer)
+            learned = taught(lesson, renderer)
             with progress("recovering headings", "positions") as report:
                 found = heading_errors(
                     lesson.model, lesson.encoding, renderer, lesson.route_views, positions,
@@ -174,31 +178,9 @@ class ModelsCommand:
 
 
 @dataclass
-class RunCommand(LearningOptions):
+class RunCommand(RunOptions):
     """Learn a route and walk it home, recorded."""
 
-    learning_walk_m: float = 0.2
-    """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
-    step_m: float = 0.05
-    """Length of a step."""
-    offset_m: float = 0.0
-    """Start this far to the left of the route (negative: right)."""
-    heading_noise_deg: float = 0.0
-    """Standard deviation of the noise on every turn."""
-    scan_deg: float = 180.0
-    """Width of the scan."""
-    scan_about_deg: float | None = None
-    """Centre the scan on this direction of the world instead of the present heading."""
-    on_lost: Annotated[str, tyro.conf.arg(metavar="stop|reset")] = "stop"
-    """stop, or reset: put the agent back on the route after the furthest waypoint reached, and count it."""
-    arrive_m: float = 0.15
-    """Arrived within this distance of the route's end."""
-    lost_m: float = 0.5
-    """Lost beyond this distance from the route."""
-    patience_m: float = 3.0
-    """Stuck in a loop after walking this far without getting farther along the route."""
-    max_steps: int | None = None
-    """Out of steps after so many. Default: as many as walk the route's length three times."""
     out: Path = Path("run")
     """Folder for the recording, trajectory, summary and picture."""
     overwrite: bool = False
@@ -211,27 +193,18 @@ class RunCommand(LearningOptions):
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        from .agent import Agent
         from .runs import check_run_folder, record_walk
 
         viewer = self.viewer if self.live else None
         inputs = [Path(name) for name in (self.world, self.route) if name is not None]
         check_run_folder(self.out, overwrite=self.overwrite, inputs=inputs, viewer=viewer)
-        if self.on_lost not in ("stop", "reset"):
-            raise InputError(f"--on-lost {self.on_lost!r}: give stop or reset")
+        self.check()
         lesson = self.prepare()
         with self.open_renderer(lesson.world) as renderer:
-            agent = Agent(
-                renderer=renderer, encoding=lesson.encoding, model=lesson.model, route=lesson.route,
-                step_length=self.step_m, scan=math.radians(self.scan_deg),
-                scan_about=None if self.scan_about_deg is None else math.radians(self.scan_about_deg),
-                heading_noise=math.radians(self.heading_noise_deg), arrive=self.arrive_m, lost=self.lost_m,
-                patience=self.patience_m, max_steps=self.max_steps, reset_when_lost=self.on_lost == "reset",
-                seed=self.seed,
-            )  # fmt: skip
+            agent = self.agent(renderer, lesson)
             start = agent.start(self.offset_m)
-            learned = lesson.teach(renderer)
-            settings = {key: value for key, value in dataclasses.asdict(self).items() if key not in NOT_SETTINGS}
+            learned = taught(lesson, renderer)
+            settings = {each.name: getattr(self, each.name) for each in dataclasses.fields(RunOptions)}
             if lesson.saved is not None:  # they say nothing of what a model from a file has learned
                 settings = {key: value for key, value in settings.items() if key not in ("every", "learning_walk_m")}
             n_views = None if learned is None else len(learned)
@@ -260,6 +233,13 @@ class PlayCommand:
         from .runs import play
 
         return play(self.run_folder, web=self.web, screenshot=self.screenshot)
+
+
+def taught(lesson: Lesson, renderer: "Renderer") -> "np.ndarray | None":
+    """`Lesson.teach`, telling the person of it."""
+    say(f"renderer: {renderer.backend}")
+    with progress("learning", "views") as report:
+        return lesson.teach(renderer, report)
 
 
 def summary(cls: type) -> str:

@@ -1,7 +1,9 @@
-"""What the commands share: flags that choose the world, the eye, the route and what is learned."""
+"""What the commands share: flags that choose the world, the eye, the route and what is kept of a view."""
 
 import dataclasses
 import math
+import shlex
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,28 +12,22 @@ import tyro
 
 from world.errors import InputError
 
-from .terminal import progress, say, saying_when_slow
+from .terminal import saying_when_slow
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from render.eye import Eye
-    from render.renderer import Renderer
     from world.geometry import Route
     from world.scene import World
 
     from .encoding import Encoding
-    from .familiarity import Model
-    from .model_files import SavedModel
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny), grown from --seed, or a file (.glb, .ply, .bin, .obj, ...)."
+    "A preset's name (tussock-field, meadow, scrub, tiny), grown from a seed, or a file (.glb, .ply, .bin, .obj, ...)."
 )
 
 ROUTE_SPACING = (
     0.02  # m, between the route views of a database and of the studies: docs/report.md derives it from the thesis
 )
-FILE_SUFFIX = ".safetensors"  # of trained models
 
 
 @dataclass
@@ -39,6 +35,8 @@ class SightOptions:
     """What world is seen, through what eye."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
+    world_seed: int | None = None
+    """Seed of a generated world. Default: --seed."""
     seed: int = 0
     """Seed of everything random: the world and route where they are generated, the model's start, the heading noise."""
     size: str | None = None
@@ -62,7 +60,7 @@ class SightOptions:
         from world.params import PRESETS
 
         if self.world in PRESETS:
-            world = World.generate(self.world, self.seed)
+            world = World.generate(self.world, self.seed if self.world_seed is None else self.world_seed)
         elif not Path(self.world).suffix and not Path(self.world).exists():
             raise InputError(f"unknown world {self.world!r}; give one of {', '.join(PRESETS)}, or a file")
         else:
@@ -86,13 +84,13 @@ class SightOptions:
             z=self.eye_height_m, samples=self.samples,
         )  # fmt: skip
 
-    def open_renderer(self, world):
+    def open_renderer(self, world, threads: int | None = None):
         from render import open_renderer
 
         with saying_when_slow(
             "opening the renderer; where it is used for the first time, it is compiled, which takes some seconds"
         ):
-            return open_renderer(world, self.eye(), self.renderer)
+            return open_renderer(world, self.eye(), self.renderer, threads=threads)
 
 
 @dataclass
@@ -100,7 +98,11 @@ class PathOptions(SightOptions):
     """What world is seen, through what eye, and a route through it."""
 
     route: Path | None = None
-    """A route file (.csv or AntWorld .bin); without it a route of about 8 m is generated."""
+    """A route file (.csv or AntWorld .bin); without it one is generated."""
+    route_seed: int | None = None
+    """Seed of a generated route. Default: --seed."""
+    route_length_m: float = 8.0
+    """Length of a generated route."""
 
     def open_route(self) -> tuple["World", "Route"]:
         """The world, and the route through it."""
@@ -109,7 +111,10 @@ class PathOptions(SightOptions):
 
         route = read_route(self.route) if self.route else None
         world = self.open_world()
-        route = route or generate_route(world, self.seed)
+        if route is None:
+            route = generate_route(
+                world, self.seed if self.route_seed is None else self.route_seed, self.route_length_m
+            )
         inside = world.field.contains(*route.xy.T)
         if not inside.all():
             x, y = route.xy[~inside][0]
@@ -147,74 +152,13 @@ class RouteOptions(PathOptions):
         return Encoding.named(name, resize=automatic if self.resize is None else self.resize, blur=self.blur)
 
 
-@dataclass
-class LearningOptions(RouteOptions):
-    """What learns."""
-
-    model: str = "perfect-memory"
-    """A model's name (see tussock models), or a file that tussock train wrote: it knows its views, encoding and size."""
-
-    def prepare(self) -> "Lesson":
-        """Everything that a model is to learn, and everything that can be refused before long work begins."""
-        from .familiarity import check_device
-        from .models import make_model
-        from .training import training_poses
-
-        check_device(self.device)
-        saved = self._open_model() if self.model.endswith(FILE_SUFFIX) else None
-        model = make_model(self.model, seed=self.seed, device=self.device) if saved is None else saved.model
-        encoding = self.chosen_encoding() if saved is None or saved.encoding is None else saved.encoding
-        world, route = self.open_route()
-        views = route.resampled(self.spacing_m)
-        poses = training_poses(views, every=self.every, learning_walk=self.learning_walk_m, field=world.field)
-        return Lesson(
-            world=world, route=route, route_views=views, poses=poses, encoding=encoding, model=model, saved=saved
-        )
-
-    def _open_model(self) -> "SavedModel":
-        """A model from a file. Refuses flags that say otherwise than it."""
-        from .model_files import load_model
-
-        saved = load_model(self.model, device=self.device)
-        if saved.eye is not None:
-            if self.size is None:
-                self.size = f"{saved.eye.width}x{saved.eye.height}"
-            if self.eye() != saved.eye:
-                raise InputError(
-                    f"{self.model} learned through another eye ({saved.eye}) than the flags ask for ({self.eye()}); "
-                    "give the same --size, --samples, --eye-height-m, --top-deg and --bottom-deg, or none"
-                )
-        said = not (self.encoding is None and self.resize is None and self.blur == 0)
-        if said and saved.encoding is not None and self.chosen_encoding() != saved.encoding:
-            raise InputError(
-                f"{self.model} learned views encoded as {str(saved.encoding)!r}, the flags ask for "
-                f"{str(self.chosen_encoding())!r}; leave out --encoding, --resize and --blur"
-            )
-        return saved
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lesson:
-    """A world, a route through it, and what is to be learned there.
-
-    route_views: the route's poses at the spacing of its views. poses: (n, 3) all that views are learned from.
-    saved: the file that the model comes from, if it does; then it has learned.
-    """
-
-    world: "World"
-    route: "Route"
-    route_views: "Route"
-    poses: "np.ndarray"
-    encoding: "Encoding"
-    model: "Model"
-    saved: "SavedModel | None"
-
-    def teach(self, renderer: "Renderer") -> "np.ndarray | None":
-        """Train the model, showing progress, unless it comes from a file; return the poses of the views it knows, if known."""
-        from .training import learn
-
-        say(f"renderer: {renderer.backend}")
-        if self.saved is not None:
-            return self.saved.poses
-        with progress("learning", "views") as report:
-            return learn(self.model, self.encoding, renderer, self.poses, report)
+def words_of(options: object, kind: type, leave_out: Collection[str] = ()) -> str:
+    """The flags that spell options, those of the fields of `kind` that are not as by default, as they are typed."""
+    words = []
+    for each in dataclasses.fields(kind):
+        value = getattr(options, each.name)
+        if each.name in leave_out or value == each.default:
+            continue
+        flag = f"--{each.name.replace('_', '-')}"
+        words += [flag] if value is True else [flag, str(value)]
+    return shlex.join(words)

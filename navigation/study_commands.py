@@ -1,7 +1,6 @@
 """The commands that re-run published studies. Heavy packages are imported where they are used."""
 
 import dataclasses
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +9,7 @@ import tyro
 
 from world.errors import InputError
 
-from .options import ROUTE_SPACING, PathOptions
+from .options import ROUTE_SPACING, PathOptions, words_of
 from .terminal import progress_of_parts, say
 
 if TYPE_CHECKING:
@@ -125,14 +124,9 @@ class StudyOptions(PathOptions):
 
     def command(self) -> str:
         """How one figure of the report is made alone; {study} and {figure} are to be filled in."""
-        words = []
-        for each in dataclasses.fields(StudyOptions):
-            value = getattr(self, each.name)
-            if each.name in ("out", "overwrite", "json") or value == each.default:
-                continue
-            flag = f"--{each.name.replace('_', '-')}"
-            words += [flag] if value is True else [flag, str(value)]
-        given = shlex.join(words).replace("{", "{{").replace("}", "}}")
+        given = (
+            words_of(self, StudyOptions, leave_out=("out", "overwrite", "json")).replace("{", "{{").replace("}", "}}")
+        )
         return f"tussock study {{study}} --figure {{figure}}{' ' * bool(given)}{given} --out {{name}}"
 
 

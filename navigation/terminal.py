@@ -1,6 +1,7 @@
 """What people see of a command while it works: messages, progress, results."""
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Timer
@@ -32,30 +33,71 @@ def progress_of_parts() -> Iterator[Callable[[str, int, int], object]]:
 
 
 @contextmanager
-def progress(what: str, unit: str) -> Iterator[Callable[..., object]]:
-    """Show progress on standard error, where that is a terminal; gives a function report(done, total, description=what)."""
+def progress(what: str, unit: str, *, aloud: bool = False) -> Iterator[Callable[..., object]]:
+    """Show progress on standard error, where that is a terminal; gives a function report(done, total, description=what).
+
+    aloud: for work of hours: show the rate as well, and elsewhere, as in the log of a job, say a line now and then.
+    """
     # Late: rich takes a tenth of a second that --help does not need.
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     words, numbers = TextColumn("{task.description}"), (MofNCompleteColumn(), TextColumn(unit), TimeRemainingColumn())
     console = Console(stderr=True)
+    pace = _Pace(unit) if aloud else None
     with Progress(
         words, BarColumn(), *numbers, console=console, transient=True, disable=not console.is_terminal
     ) as bar:
         task = bar.add_task(what, total=None)
-        yield lambda done, total, **changed: bar.update(task, completed=done, total=total, **changed)
+
+        def report(done: int, total: int, **changed: Any) -> None:
+            if pace is not None:
+                pace.reached(done, total)
+                changed["description"] = f"{what} {pace.rate:.3g} a second"
+                if not console.is_terminal:
+                    pace.tell()
+            bar.update(task, completed=done, total=total, **changed)
+
+        yield report
+
+
+class _Pace:
+    """How fast work goes on, in words."""
+
+    SECONDS = 30.0  # between two lines
+
+    def __init__(self, unit: str):
+        self.unit, self.done, self.total = unit, 0, 0
+        self.first: int | None = None  # done before this began
+        self.began = self.told = time.monotonic()
+
+    def reached(self, done: int, total: int) -> None:
+        if self.first is None:
+            self.first = done
+        self.done, self.total = done, total
+
+    @property
+    def rate(self) -> float:
+        """Of the work that was done here (1/s)."""
+        return (self.done - (self.first or 0)) / max(time.monotonic() - self.began, 1e-9)
+
+    def tell(self) -> None:
+        """Say how far it is, unless that was said a moment ago."""
+        if self.rate and (time.monotonic() - self.told > self.SECONDS or self.done == self.total):
+            self.told = time.monotonic()
+            minutes = (self.total - self.done) / self.rate / 60
+            say(f"{self.done} of {self.total} {self.unit}, {self.rate:.3g} a second, {minutes:.3g} min left")
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print a result for people: a line a value, a line a row where a value is a list of rows, a table where the rows have names."""
+    """Print a result for people: a line a value, a line each where a value is a list, a table where the rows have names."""
     width = max(map(len, result))
     for key, value in result.items():
         if isinstance(value, dict):
             show_table(key, value)
         elif isinstance(value, list):
             for row in value:
-                print("  ".join(map(text, row.values())))
+                print("  ".join(map(text, row.values())) if isinstance(row, dict) else f"{key:<{width}}  {text(row)}")
         else:
             print(f"{key:<{width}}  {text(value)}")
 

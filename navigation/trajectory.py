@@ -1,6 +1,7 @@
 """A walk in numbers: the collected steps without their views."""
 
 import csv
+import io
 import os
 from dataclasses import dataclass, field
 
@@ -56,9 +57,15 @@ class Trajectory:
             "resets": sum(reset != "" for reset in self.column("reset")),
         }
 
+    def to_csv(self) -> str:
+        """The steps as CSV."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(self.rows)
+        return text.getvalue()
+
     def write(self, path: str | os.PathLike) -> None:
         """Write the steps as CSV."""
-        with replacing(path) as partial, partial.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            writer.writerows(self.rows)
+        with replacing(path) as partial:
+            partial.write_text(self.to_csv(), encoding="utf-8", newline="")

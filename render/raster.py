@@ -39,7 +39,7 @@ class RasterRenderer:
             raise InputError(
                 f"cube faces of {face_size} pixels cannot be drawn; give at least 1, or None for what the eye needs"
             )
-        self.world, self.eye, self.backend = world, eye, backend
+        self.world, self.eye, self.backend, self._face_size = world, eye, backend, face_size
         self._cubemap = Cubemap(eye, face_size or face_size_for(eye))
         self._context = open_context(backend)
         import pyrender
@@ -52,6 +52,10 @@ class RasterRenderer:
         self._atlas = np.empty((self._cubemap.rows, self._cubemap.size, 4), dtype=np.uint8)
         # Runs at close, when the renderer is dropped, or at exit; pyrender's own clean-up would find no context then.
         self._free = weakref.finalize(self, _free, self._context, self._painter, self._picture)
+
+    def __reduce__(self):
+        """Sent to another process, it is opened anew there."""
+        return RasterRenderer, (self.world, self.eye, self.backend, self._face_size)
 
     def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width 4"]:
         """See `Renderer.render`. Threads may share a renderer; they take turns."""

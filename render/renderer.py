@@ -49,18 +49,21 @@ class Renderer(Protocol):
     ) -> None: ...
 
 
-def open_renderer(world: World, eye: Eye | None = None, backend: str = "auto") -> Renderer:
+def open_renderer(
+    world: World, eye: Eye | None = None, backend: str = "auto", *, threads: int | None = None
+) -> Renderer:
     """Open a renderer; use it in a `with` statement.
 
     backend: "cpu" (the exact scanline renderer), "egl" or "osmesa" (pyrender), or "auto": the fastest one here, which is
         the CPU renderer on every machine measured so far (CHANGELOG.md). `Renderer.backend` says which it took.
+    threads: of the CPU renderer; None takes every core this process may run on. OpenGL decides for itself.
     Raises InputError when an explicit choice cannot be had, naming what to install.
     """
     eye = eye or Eye()
     if backend in ("auto", "cpu"):
         from .scanline import ScanlineRenderer
 
-        return ScanlineRenderer(world, eye)
+        return ScanlineRenderer(world, eye, threads)
     if backend in ("egl", "osmesa"):
         from .raster import RasterRenderer
 

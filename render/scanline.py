@@ -348,6 +348,10 @@ class ScanlineRenderer:
         # Drawing nothing compiles what draws, where that was not done before, or loads it.
         self._render_strip(np.empty((0, 3)), np.empty((0, eye.height, eye.width, 4), dtype=np.uint8), 0, eye.width)
 
+    def __reduce__(self):
+        """Sent to another process, it is opened anew there."""
+        return ScanlineRenderer, (self.world, self.eye, self._threads)
+
     def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width 4"]:
         """See `Renderer.render`. Poses are shared out among threads; a single pose is cut into strips of columns."""
         if self._pool is None:

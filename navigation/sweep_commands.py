@@ -1,0 +1,50 @@
+"""The commands for many runs. Heavy packages are imported where they are used."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from world.errors import InputError
+
+from .terminal import progress, say
+
+
+@dataclass
+class SweepCommand:
+    """Do every run that a sweep file asks for: models, worlds, starts, noise, in all combinations."""
+
+    sweep: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="SWEEP.toml")]
+    """What to vary and what not (docs/sweeps.md)."""
+    out: Path = Path("sweep")
+    """Folder for the table of runs; runs that are finished there are not done again."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this sweep alone."""
+    workers: int | None = None
+    """How many of these. Default: one a core."""
+    record: Annotated[str | None, tyro.conf.arg(metavar="worst:N")] = None
+    """Keep recordings of the N worst runs."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from .sweeps.spec import read_sweep
+
+        record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
+        if record is None:
+            raise InputError(f"--record {self.record!r}: give worst:5, or another number")
+        if self.workers is not None and self.workers < 1:
+            raise InputError(f"--workers {self.workers}: give at least 1")
+        if self.scheduler is not None and self.workers is not None:
+            raise InputError("--workers are those on this machine; a scheduler has its own: give one of the two")
+        sweep = read_sweep(self.sweep)
+
+        from .sweeps.sweep import run_sweep
+
+        say(f"{len(sweep)} runs: {', '.join(f'{len(choices)} of {name}' for name, choices in sweep.axes.items())}")
+        with progress("walking", "runs", aloud=True) as report:
+            return run_sweep(
+                sweep, self.out, scheduler=self.scheduler, workers=self.workers, record=int(record[1]), progress=report
+            )

@@ -1,0 +1,185 @@
+"""Doing a sweep: on the cores of this machine or on any running Dask cluster, and going on where an earlier one stopped."""
+
+import dataclasses
+import logging
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from distributed import Client, LocalCluster, as_completed
+
+from world.errors import InputError
+
+from ..learning_commands import RunCommand
+from ..learning_options import RunOptions
+from ..options import words_of
+from ..terminal import say
+from .spec import Sweep
+from .store import Store, table_of, write_table
+from .work import Walked, lesson_key, open_path, path_key, run_key, teach, walk
+
+WORST = "worst"  # folder of the recordings
+SECONDS = 10.0  # to wait for a scheduler
+Progress = Callable[[int, int], object]
+
+
+def run_sweep(
+    sweep: Sweep, out: Path, *, scheduler: str | None = None, workers: int | None = None, record: int = 0,
+    progress: Progress = lambda done, total: None,
+) -> dict[str, Any]:  # fmt: skip
+    """Do the runs of a sweep that the folder does not hold yet, keeping each as soon as it is finished.
+
+    scheduler: address of a running Dask scheduler; None starts `workers` processes here (None: one a core). record: keep recordings of
+    so many of the worst runs. Returns what `tussock sweep` says. Raises InputError where another sweep writes to the folder, and
+    where runs could not be finished: all others are kept.
+    """
+    began = time.perf_counter()
+    runs = {run_key(run): run for run in sweep.runs()}
+    with Store(out) as store:
+        missing = {key: run for key, run in runs.items() if key not in store.finished()}
+        progress(len(runs) - len(missing), len(runs))
+        try:
+            if missing:
+                _do(
+                    missing,
+                    store,
+                    scheduler,
+                    workers,
+                    lambda done: progress(len(runs) - len(missing) + done, len(runs)),
+                )
+            rows = {key: row for key, row in store.rows().items() if key in runs}
+            worst = worst_of(rows, record)
+            for key in worst:
+                record_again(runs[key], rows[key], out / WORST / key)
+        finally:
+            path = write_table(table_of(_with_recordings(store.rows(), out)), out)
+    return {
+        "table": str(path), "runs": len(runs), "done_before": len(runs) - len(missing),
+        "arrived": sum(row.get("arrived", False) for row in rows.values()),
+        "could_not_run": sum(row["error"] is not None for row in rows.values()),
+        "recordings": [str(out / WORST / key) for key in worst], "seconds": time.perf_counter() - began,
+    }  # fmt: skip
+
+
+def _do(
+    missing: dict[str, RunOptions],
+    store: Store,
+    scheduler: str | None,
+    workers: int | None,
+    progress: Callable[[int], object],
+) -> None:
+    """Do runs on a cluster and keep what comes of them. Raises InputError for those that could not be finished."""
+    done, unfinished = 0, []
+    with cluster(scheduler, workers) as client:
+        for batch in _finished(client, missing):
+            kept = []
+            for key, result in batch:
+                if isinstance(result, Walked | InputError):
+                    kept.append((key, row_of(missing[key], result), result.steps if isinstance(result, Walked) else ""))
+                else:
+                    unfinished.append((key, result))
+            store.add(kept)
+            done += len(kept)
+            progress(done)
+    if unfinished:
+        key, error = unfinished[0]
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(
+            f"{len(unfinished)} of {len(missing)} runs could not be finished; all others are kept, and the same command tries again. "
+            f"The first, {command_of(missing[key], key)}: {first}"
+        )
+
+
+def _finished(client: Client, missing: dict[str, RunOptions]) -> Iterator[list[tuple[str, Walked | BaseException]]]:
+    """What comes of runs, as they finish: what they found, or what went wrong. Raises InputError where the cluster is lost."""
+    futures = {}
+    for key, run in missing.items():
+        path = client.submit(open_path, run, key=path_key(run))
+        taught = client.submit(teach, run, path, key=lesson_key(run))
+        futures[client.submit(walk, run, taught, key=f"run-{key}")] = key
+    path = taught = None  # so that workers forget worlds and models when the last run that needs them is done
+    waiting = as_completed(futures, loop=client.loop, raise_errors=False)
+    left = len(futures)
+    while left:
+        results = []
+        for future in waiting.next_batch(block=True):
+            if future.status in ("cancelled", "lost"):
+                raise InputError(
+                    "the scheduler is gone; all runs that were finished are kept: give the same command again"
+                )
+            error = future.exception() if future.status == "error" else None
+            results.append((futures.pop(future), future.result() if error is None else error))
+            future.release()
+        left -= len(results)
+        yield results
+
+
+@contextmanager
+def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+    """A client of a running cluster, or of one that lives as long as the block, on this machine and for it alone."""
+    with ExitStack() as stack:
+        if scheduler is None:
+            local: Any = LocalCluster(
+                n_workers=workers or len(os.sched_getaffinity(0)), threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                worker_dashboard_address="127.0.0.1:0", memory_limit=None, silence_logs=logging.CRITICAL,
+            )  # fmt: skip
+            scheduler = stack.enter_context(local).scheduler_address
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        try:
+            client = stack.enter_context(Client(scheduler, timeout=SECONDS, set_as_default=False))
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"no Dask scheduler answers at {scheduler}; start one with: dask scheduler --host 127.0.0.1"
+            ) from error
+        if not client.scheduler_info()["workers"]:
+            say(f"no worker has joined yet; waiting for one: dask worker {scheduler} --nthreads 1")
+        yield client
+
+
+def row_of(run: RunOptions, result: Walked | InputError) -> dict[str, Any]:
+    """A run's row of the table."""
+    settings = {each.name: getattr(run, each.name) for each in dataclasses.fields(RunOptions)}
+    settings = {name: str(value) if isinstance(value, Path) else value for name, value in settings.items()}
+    if isinstance(result, InputError):
+        return settings | {"error": str(result), "command": command_of(run, run_key(run))}
+    times = {"seconds": result.seconds, "learn_seconds": result.learn_seconds}
+    return settings | result.found | {"error": None, "command": command_of(run, run_key(run))} | times
+
+
+def command_of(run: RunOptions, key: str) -> str:
+    """The command that repeats a run alone, to the last bit."""
+    return f"tussock run {words_of(run, RunOptions)} --out run-{key}"
+
+
+def worst_of(rows: dict[str, dict[str, Any]], count: int) -> list[str]:
+    """Keys of the worst runs: those that did not arrive, then those put back most often, then those farthest off the route."""
+    walked = [key for key, row in rows.items() if row["error"] is None]
+    return sorted(walked, key=lambda key: _badness(rows[key]), reverse=True)[:count]
+
+
+def _badness(row: dict[str, Any]) -> tuple:
+    return not row["arrived"], row["resets"], row["mean_deviation_m"]
+
+
+def record_again(run: RunOptions, row: dict[str, Any], out: Path) -> None:
+    """Repeat a finished run with a recording, unless there is one. Raises InputError where it went another way."""
+    if (out / "summary.json").exists():
+        return
+    settings = {each.name: getattr(run, each.name) for each in dataclasses.fields(RunOptions)}
+    found = RunCommand(**settings, out=out, overwrite=True).run()
+    different = [name for name in ("arrived", "steps", "mean_deviation_m", "resets") if found[name] != row[name]]
+    if different:
+        raise InputError(
+            f"{out}: repeated on this machine, the run went another way ({', '.join(different)}); its worker computes differently"
+        )
+
+
+def _with_recordings(rows: dict[str, dict[str, Any]], out: Path) -> dict[str, dict[str, Any]]:
+    """Rows with where their recordings are, where they are."""
+    for key, row in rows.items():
+        recorded = (out / WORST / key / "summary.json").exists()
+        row["recording"] = f"{WORST}/{key}/recording.rrd" if recorded else None
+    return rows

@@ -1,0 +1,115 @@
+"""The parts of a run as the workers of a sweep do them: open the world, teach the model, walk."""
+
+import dataclasses
+import hashlib
+import json
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from render.renderer import Renderer
+from world.geometry import Route
+from world.params import PRESETS
+from world.scene import World
+
+from ..learning_options import LearningOptions, Lesson, RunOptions
+from ..options import PathOptions
+from ..threads import use_threads
+from ..trajectory import Trajectory
+
+VERSION = 1  # of what a run does: a change that alters what comes of one counts it up, and what was kept is done again
+_NOT_OF_PATH = {"size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg"}  # the eye's
+
+
+@dataclass(frozen=True, kw_only=True)
+class Taught:
+    """A lesson that was learned, what draws its world, and the poses of the views that the model knows (None: not known)."""
+
+    lesson: Lesson
+    renderer: Renderer
+    poses: np.ndarray | None
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walked:
+    """What came of a run. found: its numbers by name. steps: its trajectory as CSV. seconds: of the walk, and of the lesson before it."""
+
+    found: dict[str, Any]
+    steps: str
+    seconds: float
+    learn_seconds: float
+
+
+def open_path(options: RunOptions) -> tuple[World, Route]:
+    """The world of a run, and the route through it."""
+    return options.open_route()
+
+
+def teach(options: RunOptions, path: tuple[World, Route]) -> Taught:
+    """What a run's model learns before the walk."""
+    began = time.perf_counter()
+    lesson = options.prepare(path)
+    renderer = options.open_renderer(lesson.world)
+    poses = lesson.teach(renderer)
+    return Taught(lesson=lesson, renderer=renderer, poses=poses, seconds=time.perf_counter() - began)
+
+
+def walk(options: RunOptions, taught: Taught) -> Walked:
+    """Walk as a run's settings say."""
+    began = time.perf_counter()
+    if options.threads is not None:
+        use_threads(options.threads)
+    agent, trajectory = options.agent(taught.renderer, taught.lesson), Trajectory()
+    for step in agent.walk(agent.start(options.offset_m)):
+        trajectory.add(step)
+    found = trajectory.summary() | {"n_views": None if taught.poses is None else len(taught.poses)}
+    seconds = time.perf_counter() - began
+    return Walked(found=found, steps=trajectory.to_csv(), seconds=seconds, learn_seconds=taught.seconds)
+
+
+def run_key(options: RunOptions) -> str:
+    """What tells a run from all others, to share with whoever asks for the same one: a digest of everything that decides it."""
+    return _digest(options, {each.name for each in dataclasses.fields(RunOptions)})
+
+
+def path_key(options: RunOptions) -> str:
+    """The same, of the world and route of a run."""
+    return "path-" + _digest(options, {each.name for each in dataclasses.fields(PathOptions)} - _NOT_OF_PATH)
+
+
+def lesson_key(options: RunOptions) -> str:
+    """The same, of what its model learns."""
+    return "lesson-" + _digest(options, {each.name for each in dataclasses.fields(LearningOptions)})
+
+
+def _digest(options: RunOptions, names: set[str]) -> str:
+    settings = {name: getattr(options, name) for name in sorted(names)}
+    world_seed, route_seed = (
+        options.seed if seed is None else seed for seed in (options.world_seed, options.route_seed)
+    )
+    settings |= {"world_seed": world_seed, "route_seed": route_seed}
+    if "model" not in names:
+        del settings["seed"]  # of which nothing else here depends
+    if options.route is not None:
+        settings |= {"route": _content(options.route), "route_seed": None, "route_length_m": None}
+    if options.world not in PRESETS:
+        settings |= {"world": _content(Path(options.world)), "world_seed": None}
+    if "model" in names and Path(options.model).is_file():
+        settings["model"] = _content(Path(options.model))
+    return hashlib.sha256(json.dumps([VERSION, settings], default=str).encode()).hexdigest()[:16]
+
+
+def _content(path: Path) -> str:
+    """Digest of a file."""
+    status = path.stat()
+    return _content_of(path, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=1024)
+def _content_of(path: Path, size: int, changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
