@@ -5,6 +5,7 @@ PLY: a header comment), and reads back equal. Coordinates are metres with z up, 
 """
 
 import csv
+import errno
 import json
 import os
 from collections.abc import Iterator
@@ -39,7 +40,8 @@ def replacing(path: str | os.PathLike) -> Iterator[Path]:
         yield partial
         os.replace(partial, path)
     except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); give another name") from error
+        remedy = "make room there" if error.errno == errno.ENOSPC else "give another name"
+        raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy}") from error
     finally:
         partial.unlink(missing_ok=True)
 

@@ -111,7 +111,7 @@ def table_of(rows: dict[str, dict[str, Any]]) -> pd.DataFrame:
     """A row a run, in an order and with types that depend on the runs alone."""
     table = pd.DataFrame([{"key": key} | row for key, row in sorted(rows.items(), key=_in_order)])
     table = table.convert_dtypes(convert_floating=False)  # numbers stay whole where some are missing
-    empty = [name for name in table.columns if table[name].isna().all()]
+    empty = table.columns[table.isna().all().to_numpy()]
     return table.astype(dict.fromkeys(empty, "string"))
 
 
@@ -119,7 +119,7 @@ def write_table(table: pd.DataFrame, folder: Path) -> Path:
     """Write the table of a sweep as parquet."""
     path = folder / TABLE
     with replacing(path) as partial:
-        table.to_parquet(partial, index=False)
+        partial.write_bytes(table.to_parquet(index=False))
     return path
 
 

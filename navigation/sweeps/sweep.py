@@ -5,7 +5,7 @@ import logging
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..learning_commands import RunCommand
 from ..learning_options import RunOptions
 from ..options import words_of
 from ..terminal import say
+from . import work
 from .spec import Sweep
 from .store import Store, table_of, write_table
 from .work import Walked, lesson_key, open_path, path_key, run_key, teach, walk
@@ -54,8 +55,11 @@ def run_sweep(
             worst = worst_of(rows, record)
             for key in worst:
                 record_again(runs[key], rows[key], out / WORST / key)
-        finally:
-            path = write_table(table_of(_with_recordings(store.rows(), out)), out)
+        except BaseException:
+            with suppress(InputError):  # what ended the sweep matters more, a full disk above all
+                _write_table(store, out)
+            raise
+        path = _write_table(store, out)
     return {
         "table": str(path), "runs": len(runs), "done_before": len(runs) - len(missing),
         "arrived": sum(row.get("arrived", False) for row in rows.values()),
@@ -125,9 +129,10 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             local: Any = LocalCluster(
                 n_workers=workers or len(os.sched_getaffinity(0)), threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
                 worker_dashboard_address="127.0.0.1:0", memory_limit=None, silence_logs=logging.CRITICAL,
+                preload=[work.__name__],
             )  # fmt: skip
             scheduler = stack.enter_context(local).scheduler_address
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what goes wrong is said in one line, below
         try:
             client = stack.enter_context(Client(scheduler, timeout=SECONDS, set_as_default=False))
         except (OSError, ValueError) as error:
@@ -177,9 +182,10 @@ def record_again(run: RunOptions, row: dict[str, Any], out: Path) -> None:
         )
 
 
-def _with_recordings(rows: dict[str, dict[str, Any]], out: Path) -> dict[str, dict[str, Any]]:
-    """Rows with where their recordings are, where they are."""
+def _write_table(store: Store, out: Path) -> Path:
+    """Write the table of all finished runs, with where their recordings are, where they are."""
+    rows = store.rows()
     for key, row in rows.items():
         recorded = (out / WORST / key / "summary.json").exists()
         row["recording"] = f"{WORST}/{key}/recording.rrd" if recorded else None
-    return rows
+    return write_table(table_of(rows), out)

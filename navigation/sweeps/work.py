@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 import json
+import signal
 import time
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from render.renderer import Renderer
+from render.renderer import Renderer, open_renderer
 from world.geometry import Route
 from world.params import PRESETS
 from world.scene import World
@@ -45,6 +46,11 @@ class Walked:
     learn_seconds: float
 
 
+def dask_setup(worker: Any) -> None:
+    """What Dask calls in each worker that a sweep starts. Ctrl-C in a terminal reaches all processes: it is the sweep that ends these."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def open_path(options: RunOptions) -> tuple[World, Route]:
     """The world of a run, and the route through it."""
     return options.open_route()
@@ -54,7 +60,7 @@ def teach(options: RunOptions, path: tuple[World, Route]) -> Taught:
     """What a run's model learns before the walk."""
     began = time.perf_counter()
     lesson = options.prepare(path)
-    renderer = options.open_renderer(lesson.world)
+    renderer = open_renderer(lesson.world, options.eye(), options.renderer, threads=options.threads)
     poses = lesson.teach(renderer)
     return Taught(lesson=lesson, renderer=renderer, poses=poses, seconds=time.perf_counter() - began)
 
