@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -14,16 +15,10 @@ from world.geometry import Pose, Route, columns_of_turn, wrap_angle
 from .encoding import Encoding
 from .familiarity import FamiliarityModel, SequenceModel, SnapshotModel
 from .rotation import best_turn, scan_window
+from .rules import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Progress, Rules, check_distance, check_limits
 from .threads import OneTorchThread
 
-# Why a walk ends. The first is success.
-ARRIVED, LOST, STUCK, OUT_OF_WORLD, OUT_OF_STEPS = (
-    "arrived",
-    "lost",
-    "stuck in a loop",
-    "out of the world",
-    "out of steps",
-)
+__all__ = ["ARRIVED", "LOST", "OUT_OF_STEPS", "OUT_OF_WORLD", "STUCK", "Agent", "Step"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +49,7 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rules:
+class AgentSettings:
     """How an agent walks, and when a walk ends.
 
     step_length (m). scan: width of the scan (rad), about the present heading, or about the world direction `scan_about` (rad).
@@ -81,10 +76,8 @@ class Rules:
     waypoint_spacing: float = 0.1
 
     def __post_init__(self):
-        for name in ("step_length", "arrive", "lost", "patience", "waypoint_spacing"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"{name.replace('_', ' ')} {value} m; give a finite distance over 0")
+        check_distance("waypoint_spacing", self.waypoint_spacing)
+        check_limits(self)
         if not (np.isfinite(self.heading_noise) and self.heading_noise >= 0):
             raise InputError(f"heading noise {np.degrees(self.heading_noise):g} degrees; give 0 or more")
         scan_window(4, self.scan)  # refuses what is no angle
@@ -92,13 +85,11 @@ class Rules:
             raise InputError(
                 f"a scan about {self.scan_about}; give a finite direction, or None for the present heading"
             )
-        if self.max_steps is not None and self.max_steps < 1:
-            raise InputError(f"at most {self.max_steps} steps; give at least 1")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Agent(Rules):
-    """Follows a route by familiarity, under rules.
+class Agent(AgentSettings):
+    """Follows a route by familiarity.
 
     How far along the route the agent is, is where the route is nearest: a route that crosses itself can be cut short there.
     """
@@ -108,15 +99,23 @@ class Agent(Rules):
     model: FamiliarityModel
     route: Route
 
+    @cached_property
+    def rules(self) -> Rules:
+        """When its walks end."""
+        return Rules(
+            route=self.route, field=self.renderer.world.field, step_length=self.step_length, arrive=self.arrive, lost=self.lost,
+            patience=self.patience, max_steps=self.max_steps,
+        )  # fmt: skip
+
     @property
     def step_limit(self) -> int:
         """The number of steps after which the walk ends."""
-        return self.max_steps or int(np.ceil(3 * self.route.length / self.step_length))
+        return self.rules.step_limit
 
     def start(self, offset: float = 0.0) -> Pose:
         """The route's first pose, moved `offset` metres to its left (negative: right)."""
         pose = self.route.start.moved(0.0, offset)
-        self._check_inside(pose)
+        self.rules.check_inside(pose)
         return pose
 
     def walk(self, start: Pose) -> Iterator[Step]:
@@ -133,7 +132,7 @@ class Agent(Rules):
         Until the last one ends, torch works on one thread.
         """
         for start in starts:
-            self._check_inside(start)
+            self.rules.check_inside(start)
         walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
         with OneTorchThread():
             for index in range(self.step_limit + 1):
@@ -183,32 +182,9 @@ class Agent(Rules):
             return np.tile(scan_window(width, self.scan), (len(headings), 1))
         return np.stack([scan_window(width, self.scan, float(wrap_angle(self.scan_about - each))) for each in headings])
 
-    def _from_goal(self, pose: Pose) -> float:
-        """Distance from the route's end (m)."""
-        return float(np.hypot(pose.x - self.route.goal.x, pose.y - self.route.goal.y))
-
-    def _reason(self, index: int, pose: Pose, deviation: float, steps_without_gain: int, been_away: bool) -> str | None:
-        """Why the walk ends here, or None."""
-        if been_away and self._from_goal(pose) <= self.arrive:
-            return ARRIVED
-        if not self.renderer.world.field.contains(pose.x, pose.y):
-            return OUT_OF_WORLD
-        if deviation > self.lost:
-            return LOST
-        if steps_without_gain * self.step_length >= self.patience:
-            return STUCK
-        return OUT_OF_STEPS if index >= self.step_limit else None
-
     def _waypoint_after(self, along: float) -> float:
         """Distance along the route of the first waypoint beyond `along`."""
         return min((np.floor(along / self.waypoint_spacing + 1e-9) + 1) * self.waypoint_spacing, self.route.length)
-
-    def _check_inside(self, pose: Pose) -> None:
-        field = self.renderer.world.field
-        if not np.isfinite(pose).all() or not field.contains(pose.x, pose.y):
-            raise InputError(
-                f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
-            )
 
 
 class _Walk:
@@ -218,8 +194,7 @@ class _Walk:
         self.agent, self.pose = agent, start
         self.random = np.random.default_rng(seed)
         self.following = agent.model.follow() if isinstance(agent.model, SequenceModel) else None
-        self.furthest, self.gained_at = -np.inf, 0
-        self.been_away = agent._from_goal(agent.route.start) > agent.arrive  # else the route ends where it starts
+        self.progress = Progress(agent.rules)
         self.reset: str | None = None
         self.ended = False
 
@@ -230,10 +205,7 @@ class _Walk:
         """The step that follows from a look, taken. turn: to the most familiar heading; towards: the route's heading here (rad)."""
         agent, pose = self.agent, self.pose
         turn = float(wrap_angle(turn + agent.heading_noise * self.random.standard_normal()))
-        if along > self.furthest:
-            self.furthest, self.gained_at = along, index
-        self.been_away = self.been_away or agent._from_goal(pose) > agent.arrive
-        reason = agent._reason(index, pose, deviation, index - self.gained_at, self.been_away)
+        reason = self.progress.look(index, pose, deviation, along)
         recovering = agent.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < agent.step_limit
         step = Step(
             index=index, pose=pose, view=view, familiarity=familiarity, turn=turn, match=match,
@@ -242,10 +214,11 @@ class _Walk:
             reset=self.reset, reason=None if recovering else reason,
         )  # fmt: skip
         if recovering:
-            self.furthest, self.gained_at = agent._waypoint_after(self.furthest), index
-            self.pose, self.reset = Pose(*agent.route.at(self.furthest)[0].tolist()), reason
+            self.progress.put(agent._waypoint_after(self.progress.furthest))
+            self.pose, self.reset = Pose(*agent.route.at(self.progress.furthest)[0].tolist()), reason
         elif reason:
             self.ended = True
         else:
             self.pose, self.reset = pose.turned(turn).moved(agent.step_length), None
+        self.progress.step()
         return step

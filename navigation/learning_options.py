@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from world.geometry import Route
     from world.scene import World
 
-    from .agent import Agent, Rules
+    from .agent import Agent, AgentSettings
     from .encoding import Encoding
     from .familiarity import Model
     from .model_files import SavedModel
@@ -124,7 +124,7 @@ class RunOptions(LearningOptions):
         from .models import make_model
         from .training import training_poses
 
-        self.rules()
+        self.agent_settings()
         check_device(self.device)
         if self.model.endswith(FILE_SUFFIX):
             self._open_model()
@@ -148,13 +148,13 @@ class RunOptions(LearningOptions):
         if self.route is not None and not self.route.exists():
             raise InputError(f"there is no route {self.route}")
 
-    def rules(self) -> "Rules":
-        """The rules of the walk that these flags spell."""
-        from .agent import Rules
+    def agent_settings(self) -> "AgentSettings":
+        """How an agent walks by these flags."""
+        from .agent import AgentSettings
 
         if self.on_lost not in ("stop", "reset"):
             raise InputError(f"--on-lost {self.on_lost!r}: give stop or reset")
-        return Rules(
+        return AgentSettings(
             step_length=self.step_m, scan=math.radians(self.scan_deg),
             scan_about=None if self.scan_about_deg is None else math.radians(self.scan_about_deg),
             heading_noise=math.radians(self.heading_noise_deg), arrive=self.arrive_m, lost=self.lost_m, patience=self.patience_m,
@@ -166,7 +166,7 @@ class RunOptions(LearningOptions):
         from .agent import Agent
 
         return Agent(
-            renderer=renderer, encoding=lesson.encoding, model=lesson.model, route=lesson.route, **vars(self.rules())
+            renderer=renderer, encoding=lesson.encoding, model=lesson.model, route=lesson.route, **vars(self.agent_settings())
         )
 
 
