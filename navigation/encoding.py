@@ -171,6 +171,18 @@ class Encoding:
             images = step(images)
         return images.astype(np.float32, copy=False)
 
+    def bounds(self, height: int, width: int) -> tuple[tuple[int, int], float, float]:
+        """Shape (h, w) of the feature image of a view of height x width, and between what numbers it lies, but for rounding."""
+        images, low, high = np.zeros((1, height, width, 4), np.uint8), 0.0, 1.0
+        for step in self.steps:
+            images = step(images)
+            if isinstance(step, VerticalEdges):
+                low, high = 0.0, high - low
+            elif isinstance(step, Normalise):
+                high = float(np.sqrt(images.size - 1))  # of one pixel that differs from all others
+                low = -high
+        return (images.shape[1], images.shape[2]), low, high
+
     def __str__(self) -> str:
         return " | ".join(
             " ".join([step.word, *(f"{getattr(step, f.name):.15g}" for f in fields(step))]) for step in self.steps

@@ -55,16 +55,9 @@ class SightOptions:
     """See triangles only from their front, as the original Sussex renderer did."""
 
     def open_world(self):
-        from world import World
-        from world.files import read_world
-        from world.params import PRESETS
+        from world.files import open_world
 
-        if self.world in PRESETS:
-            world = World.generate(self.world, self.seed if self.world_seed is None else self.world_seed)
-        elif not Path(self.world).suffix and not Path(self.world).exists():
-            raise InputError(f"unknown world {self.world!r}; give one of {', '.join(PRESETS)}, or a file")
-        else:
-            world = read_world(self.world)
+        world = open_world(self.world, self.seed if self.world_seed is None else self.world_seed)
         return dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
 
     def width_and_height(self) -> tuple[int, int]:
@@ -107,7 +100,7 @@ class PathOptions(SightOptions):
     def open_route(self) -> tuple["World", "Route"]:
         """The world, and the route through it."""
         from world.files import read_route
-        from world.walk import generate_route
+        from world.walk import check_route, generate_route
 
         route = read_route(self.route) if self.route else None
         world = self.open_world()
@@ -115,12 +108,7 @@ class PathOptions(SightOptions):
             route = generate_route(
                 world, self.seed if self.route_seed is None else self.route_seed, self.route_length_m
             )
-        inside = world.field.contains(*route.xy.T)
-        if not inside.all():
-            x, y = route.xy[~inside][0]
-            raise InputError(
-                f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
-            )
+        check_route(world, route)
         return world, route
 
 

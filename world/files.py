@@ -19,6 +19,7 @@ from jaxtyping import Float
 from .colours import face_rgb, texture_of
 from .errors import InputError
 from .geometry import Bounds, Route
+from .params import PRESETS
 from .scene import Ground, World
 
 KEY = "tussock"  # under which a file carries what a mesh cannot hold
@@ -54,6 +55,15 @@ def check_writable(path: Path) -> None:
         raise InputError(f"{path} cannot be written: there is no folder {path.parent}; create it first")
     if not os.access(path.parent, os.W_OK):
         raise InputError(f"{path} cannot be written: the folder {path.parent} is read-only; choose another")
+
+
+def open_world(name: str, seed: int = 0) -> World:
+    """A world by name: a preset's, grown from the seed, or a file's. Raises InputError where it is neither."""
+    if name in PRESETS:
+        return World.generate(name, seed)
+    if not Path(name).suffix and not Path(name).exists():
+        raise InputError(f"unknown world {name!r}; give one of {', '.join(PRESETS)}, or a file")
+    return read_world(name)
 
 
 def read_world(path: str | os.PathLike) -> World:

@@ -78,6 +78,16 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     )
 
 
+def check_route(world: World, route: Route) -> None:
+    """Refuse a route that leaves the world. Raises InputError."""
+    inside = world.field.contains(*route.xy.T)
+    if not inside.all():
+        x, y = route.xy[~inside][0]
+        raise InputError(
+            f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
+        )
+
+
 def _footprints(world: World) -> Float[np.ndarray, "n 6 2"]:
     """What of each triangle stands between the ground and body height, seen from above: convex, in order around.
 
