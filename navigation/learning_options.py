@@ -166,7 +166,11 @@ class RunOptions(LearningOptions):
         from .agent import Agent
 
         return Agent(
-            renderer=renderer, encoding=lesson.encoding, model=lesson.model, route=lesson.route, **vars(self.agent_settings())
+            renderer=renderer,
+            encoding=lesson.encoding,
+            model=lesson.model,
+            route=lesson.route,
+            **vars(self.agent_settings()),
         )
 
 
