@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float32, Int64
 from world.errors import InputError
 
 from .rotation import in_parts
+from .spelling import spell
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]
@@ -98,6 +99,10 @@ class Model(ABC):
     seed: int = 0
     learned: Learned = field(init=False, repr=False, default_factory=dict)
     shape: tuple[int, int] | None = field(init=False, repr=False, default=None)
+
+    def __str__(self) -> str:
+        """What `make_model` makes it of, untrained, beside seed and device: its name and the parameters that are not the defaults."""
+        return spell(self.name, self.parameters, type(self))
 
     def fit(self: Self, views: Images) -> Self:
         """Learn the views, forgetting earlier ones. Raises InputError for no views and for values that are not finite."""

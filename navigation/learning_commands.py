@@ -52,7 +52,7 @@ class EvaluateCommand(LearningOptions):
                     scan=math.radians(self.scan_deg), progress=report,
                 )  # fmt: skip
         return {
-            "model": lesson.model.name, "encoding": str(lesson.encoding),
+            "model": str(lesson.model), "encoding": str(lesson.encoding),
             "n_views": None if learned is None else len(learned), "n_positions": len(positions),
             "median_error_deg": found.median_error_deg, "mean_error_deg": found.mean_error_deg,
             "share_over_45": found.share_over_45, "seconds": time.perf_counter() - began,
@@ -92,7 +92,7 @@ class TrainCommand(LearningOptions):
             learn = model.partial_fit
         else:
             raise InputError(
-                f"{self.model}: {model.name} learns all its views at once and cannot go on; give --model {model.name}"
+                f"{self.model}: {model.name} learns all its views at once and cannot go on; give --model '{model}'"
             )
         with self.open_renderer(lesson.world) as renderer:
             with progress("looking", "views") as report:
@@ -105,7 +105,7 @@ class TrainCommand(LearningOptions):
             seconds = time.perf_counter() - began
             save_model(model, self.out, encoding=lesson.encoding, eye=renderer.eye, poses=poses)
         return {
-            "file": str(self.out), "model": model.name, "encoding": str(lesson.encoding), "n_views": len(views),
+            "file": str(self.out), "model": str(model), "encoding": str(lesson.encoding), "n_views": len(views),
             "memory_bytes": model.memory_bytes, "fit_seconds": seconds,
         }  # fmt: skip
 
@@ -115,7 +115,8 @@ class CompareCommand(RouteOptions):
     """Train and test models side by side: headings recovered beside the route, and a walk home."""
 
     models: str = "all"
-    """all, or names separated by commas (see tussock models)."""
+    """all, or names separated by commas (see tussock models). Parameters may follow a name, as in 'infomax rate=baddeley,chain';
+    commas inside parentheses separate no names: 'mlp hidden_layer_sizes=(100,50),chain'."""
     learning_walk_m: float = 0.2
     """Reach of the learning walk before the walk home. Headings are recovered from views on the route alone."""
     grid_m: float = 0.2
@@ -132,13 +133,14 @@ class CompareCommand(RouteOptions):
         from .evaluation import grid_positions
         from .familiarity import check_device
         from .models import MODELS, make_model
+        from .spelling import split_list
         from .training import training_poses
 
         check_device(self.device)
-        names = list(MODELS) if self.models == "all" else [name.strip() for name in self.models.split(",")]
+        names = list(MODELS) if self.models == "all" else split_list(self.models)
         names = list(dict.fromkeys(names))
         for name in names:
-            make_model(name)  # refuses unknown ones before the work begins
+            make_model(name)  # refuses what is none before the work begins
         encoding = self.chosen_encoding()
         world, route = self.open_route()
         views = route.resampled(self.spacing_m)

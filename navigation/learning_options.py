@@ -32,7 +32,8 @@ class LearningOptions(RouteOptions):
     """What learns."""
 
     model: str = "perfect-memory"
-    """A model's name (see tussock models), or a file that tussock train wrote: it knows its views, encoding and size."""
+    """A model's name (see tussock models), or a file that tussock train wrote: it knows its views, encoding and size.
+    Parameters may follow the name, as in 'mushroom-body inputs=10 cells=20000' or 'mlp hidden_layer_sizes=100,50'."""
     threads: int | None = None
     """Threads to draw, learn and match with. Default: one a core. What networks learn depends on it in its last digits."""
 

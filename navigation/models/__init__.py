@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from world.errors import InputError
 
 from ..familiarity import Model
+from ..spelling import read_parameters, split_words
 
 if TYPE_CHECKING:
     from .adaboost import AdaBoost
@@ -70,9 +71,23 @@ def model_class(name: str) -> type[Model]:
 
 
 def make_model(name: str, **parameters) -> Model:
-    """An untrained model by its name; parameters are its class's, such as seed and device. Raises InputError for unknown names."""
+    """An untrained model by its name, which parameters may follow: "mushroom-body inputs=10 cells=20000".
+
+    Parameters are its class's, and can be keywords as well; seed and device can only be these. Raises InputError for unknown names
+    and parameters, and for values that mean nothing.
+    """
+    name, *words = split_words(text := name) or [""]
+    try:
+        cls = model_class(name.removeprefix(OPPONENT))
+        spelled = read_parameters(words, cls)
+        if twice := spelled.keys() & parameters.keys():
+            raise InputError(f"{', '.join(sorted(twice))} is also given as a keyword; give it once")
+        model = cls(**spelled, **parameters)
+        model.check_parameters()
+    except InputError as error:
+        raise InputError(f"model {text!r}: {error}") if words else error from None
     if name.startswith(OPPONENT):
         from .opponents import opponent
 
-        return opponent(model_class(name.removeprefix(OPPONENT))(**parameters))
-    return model_class(name)(**parameters)
+        return opponent(model)
+    return model

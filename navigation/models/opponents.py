@@ -27,6 +27,9 @@ class Opponent(Model):
     def __repr__(self) -> str:
         return f"Opponent({self.attractive!r})"
 
+    def __str__(self) -> str:
+        return f"opponent-{self.attractive}"
+
     @property
     def parameters(self) -> dict[str, Any]:
         """Those of the model it is made of."""
