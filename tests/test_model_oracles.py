@@ -1,6 +1,7 @@
 """Each model against a computation that shares nothing with it."""
 
 from itertools import pairwise, product
+from operator import mul
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jaxtyping import TypeCheckError
 from scenes import views
+from scipy.stats import chisquare, kstest
 from sklearn.base import clone
 from sklearn.metrics import classification_report
 from sklearn.model_selection import GridSearchCV
@@ -28,6 +30,7 @@ from navigation.models import (
     MLPRotation,
     MushroomBody,
     PerfectMemory,
+    RandomHeadings,
     VisualCompass,
     make_model,
     perfect_memory,
@@ -36,6 +39,7 @@ from navigation.models.adaboost import best_stump, haar_filters
 from navigation.models.infomax import RATES, infomax_update
 from navigation.models.mlp_rotation import swayed
 from navigation.models.mushroom_body import receptive_fields
+from navigation.models.random import mixed
 from world.errors import InputError
 
 REFUSED = (InputError, TypeCheckError)
@@ -607,6 +611,67 @@ def test_rotation_network_scan_equals_the_network_on_rolled_views():
     w, b, out = (model.learned[key].double().numpy() for key in ("weights", "biases", "output"))
     activity = np.maximum(turned(views(3, 1)).reshape(3, 24, -1) @ w.reshape(9, -1).T + b, 0)
     assert np.allclose(model.scan(views(3, 1)), activity @ out[0], atol=1e-4)
+
+
+# Random headings
+
+
+def split_mix(number: int) -> int:
+    number = (number + 0x9E3779B97F4A7C15) % 2**64
+    number = (number ^ (number >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+    number = (number ^ (number >> 27)) * 0x94D049BB133111EB % 2**64
+    return number ^ (number >> 31)
+
+
+def test_hashes_are_mixed_as_split_mix_does():
+    assert mixed(np.array([1234567], dtype=np.uint64)).tolist() == [6457827717110365317]  # its published first draw
+    numbers = np.random.default_rng(0).integers(2**64, size=50, dtype=np.uint64)
+    assert mixed(numbers).tolist() == [split_mix(number) for number in numbers.tolist()]
+
+
+def test_random_familiarity_is_the_hash_of_each_rolled_view():
+    model, queries = RandomHeadings(seed=3).fit(views(2, h=3, w=7)), views(2, 1, h=3, w=7)
+    rows, columns = (model.learned[key].tolist() for key in ("rows", "columns"))
+    assert all(weight % 2 for weight in rows + columns)
+    scan = model.scan(queries)
+    for n, k in product(range(2), range(7)):
+        total = 0
+        for j, column in enumerate(queries[n].roll(k, dims=-1).T):
+            bits = [int.from_bytes(pixel.numpy().tobytes(), "little") for pixel in column]
+            total += split_mix(sum(map(mul, rows, bits)) % 2**64) * columns[j]
+        assert scan[n, k].item() == (split_mix(total % 2**64) >> 40) / 2**24
+
+
+def test_random_headings_are_uniform_and_forget_the_view_before():
+    width, model = 24, RandomHeadings().fit(views(1))
+    seen = views(1000, 1)
+    seen[1::2] = seen[::2]
+    seen[1::2, 2, 11] += 1e-6  # of two consecutive views only this tells the second from the first
+    headings = model.scan(seen).argmax(dim=1).numpy()
+    assert chisquare(np.bincount(headings[::2], minlength=width)).pvalue > 0.01
+    assert chisquare(np.bincount(headings[1::2], minlength=width)).pvalue > 0.01
+    assert chisquare(np.bincount((headings[1::2] - headings[::2]) % width, minlength=width)).pvalue > 0.01
+    assert kstest(model.scan(views(1000, 2)).flatten().numpy(), "uniform").pvalue > 0.01
+
+
+@pytest.mark.parametrize("image", [torch.zeros(5, 24), torch.ones(5, 24)], ids=["blank", "ones"])
+def test_random_headings_are_uniform_over_views_of_one_changed_pixel(image):
+    # Numbers of few bits, nearly all the same: what a weak hash would map alike.
+    seen = torch.stack([image] * 1000)
+    seen[:, 1, 3] = torch.arange(1000) / 1024 + 2
+    headings = RandomHeadings().fit(views(1)).scan(seen).argmax(dim=1).numpy()
+    assert chisquare(np.bincount(headings, minlength=24)).pvalue > 0.01
+
+
+def test_random_familiarity_takes_minus_zero_for_zero():
+    model = RandomHeadings().fit(views(1))
+    assert torch.equal(model.scan(torch.full((1, 5, 24), -0.0)), model.scan(torch.zeros(1, 5, 24)))
+
+
+def test_random_headings_keep_nothing_of_the_views():
+    one, other = RandomHeadings().fit(views(9)), RandomHeadings().fit(views(2, 1))
+    assert all(torch.equal(one.learned[key], other.learned[key]) for key in one.learned)
+    assert one.memory_bytes == 8 * (5 + 24)
 
 
 # Opponent

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .mushroom_body import MushroomBody
     from .opponents import opponent
     from .perfect_memory import PerfectMemory
+    from .random import RandomHeadings
     from .rbm import RBM
     from .visual_compass import VisualCompass
 
@@ -34,6 +35,7 @@ __all__ = [
     "MLPRotation",
     "MushroomBody",
     "PerfectMemory",
+    "RandomHeadings",
     "VisualCompass",
     "make_model",
     "opponent",
@@ -41,6 +43,7 @@ __all__ = [
 
 # A model is the class in the file of its name.
 MODELS = {
+    "random": "RandomHeadings",
     "visual-compass": "VisualCompass",
     "perfect-memory": "PerfectMemory",
     "chain": "Chain",
