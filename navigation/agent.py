@@ -32,6 +32,7 @@ class Step:
     deviation: distance from the route (m). along: how far along the route the nearest place is (m).
     error: how far the chosen heading is from the route's there (rad, -pi..pi).
     reason: None while the walk goes on, else why it ends. reset: why the agent was put back on the route before this look, or None.
+    failure: why it fails here, whether the walk ends or the agent is put back after this look; None where it does not fail.
     """
 
     index: int
@@ -46,6 +47,7 @@ class Step:
     error: float
     reason: str | None
     reset: str | None
+    failure: str | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,7 +213,7 @@ class _Walk:
             index=index, pose=pose, view=view, familiarity=familiarity, turn=turn, match=match,
             place=None if self.following is None else self.following.place,
             deviation=deviation, along=along, error=float(wrap_angle(pose.heading + turn - towards)),
-            reset=self.reset, reason=None if recovering else reason,
+            reset=self.reset, reason=None if recovering else reason, failure=None if reason == ARRIVED else reason,
         )  # fmt: skip
         if recovering:
             self.progress.put(agent._waypoint_after(self.progress.furthest))

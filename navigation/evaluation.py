@@ -16,6 +16,7 @@ from .familiarity import FamiliarityModel, Images
 from .rotation import best_turn, scan_window
 
 BATCH = 64  # views rendered, encoded and scored at once
+RECOVERED_DEG = 45.0  # a heading less than this off counts as recovered
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +42,7 @@ class HeadingErrors:
 
     @property
     def share_over_45(self) -> float:
-        return float(np.mean(np.degrees(self.errors) > 45))
+        return float(np.mean(np.degrees(self.errors) > RECOVERED_DEG))
 
 
 def grid_positions(route: Route, *, grid: float, within: float, field: Bounds) -> Float[np.ndarray, "n 2"]:

@@ -14,9 +14,9 @@ import torch
 from jaxtyping import Bool, Float32, Int64
 
 from world.errors import InputError
+from world.spelling import spell
 
 from .rotation import in_parts
-from .spelling import spell
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]

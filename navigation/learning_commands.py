@@ -129,11 +129,12 @@ class CompareCommand(RouteOptions):
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
+        from world.spelling import split_list
+
         from .comparison import compare_models
         from .evaluation import grid_positions
         from .familiarity import check_device
         from .models import MODELS, make_model
-        from .spelling import split_list
         from .training import training_poses
 
         check_device(self.device)

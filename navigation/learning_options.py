@@ -119,7 +119,7 @@ class RunOptions(LearningOptions):
         import numpy as np
 
         from world.geometry import Route
-        from world.params import PRESETS
+        from world.params import PRESETS, WorldParams, is_generated
 
         from .familiarity import check_device
         from .models import make_model
@@ -130,7 +130,7 @@ class RunOptions(LearningOptions):
         if self.model.endswith(FILE_SUFFIX):
             self._open_model()
         else:
-            make_model(self.model, seed=self.seed, device=self.device).check_parameters()
+            make_model(self.model, seed=self.seed, device=self.device)
         self.eye()
         self.chosen_encoding()
         training_poses(Route.through(np.eye(2)), every=self.every, learning_walk=self.learning_walk_m)
@@ -144,7 +144,9 @@ class RunOptions(LearningOptions):
         for name in (self.seed, self.world_seed, self.route_seed):
             if name is not None and name < 0:
                 raise InputError(f"seed {name}; give a whole number from 0")
-        if self.world not in PRESETS and not Path(self.world).exists():
+        if is_generated(self.world):
+            WorldParams.named(self.world)
+        elif not Path(self.world).exists():
             raise InputError(f"there is no world {self.world!r}; give one of {', '.join(PRESETS)}, or a file")
         if self.route is not None and not self.route.exists():
             raise InputError(f"there is no route {self.route}")

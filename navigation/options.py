@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from .encoding import Encoding
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny), grown from a seed, or a file (.glb, .ply, .bin, .obj, ...)."
+    "A preset's name (tussock-field, meadow, scrub, tiny), grown from a seed; its parameters may follow, as in "
+    "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...)."
 )
 
 ROUTE_SPACING = (

@@ -26,16 +26,23 @@ from rerun.experimental import ViewerClient
 from render.renderer import Renderer
 from world.errors import InputError
 from world.files import replacing
-from world.geometry import Route, turn_of_columns
+from world.geometry import Pose, Route, turn_of_columns
 from world.scene import World
 
 from .agent import ARRIVED, Step
+from .failures import ALIASING, CORNER, OCCLUSION, OFF_CATCHMENT, UNEXPLAINED, UNLEARNED, Evidence, cause, in_words
 
 TIMELINE = "step"
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
+CAUSE_COLOURS = {
+    OCCLUSION: (20, 20, 20), OFF_CATCHMENT: (125, 60, 230), ALIASING: (255, 70, 190), UNLEARNED: (255, 225, 0), CORNER: (0, 220, 220),
+    UNEXPLAINED: (150, 150, 150),
+}  # fmt: skip
 FLUSH_SECONDS = 0.5  # what a crash may lose of a recording
-ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
+ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible ..
+MARKED = 0.04  # m; .. and marks of poor steps above these
+CLOSE = 0.6  # m; marks of one cause nearer than this to the one that names it bear no name
 
 
 class Recording:
@@ -51,8 +58,9 @@ class Recording:
         training_poses: Float[np.ndarray, "n 3"] | None = None, lost: float = 0.5, live: str | None = None, title: str = "",
     ):  # fmt: skip
         self._renderer, self._training_poses = renderer, training_poses
-        self._waiting: list[Step] = []
+        self._waiting: list[tuple[Step, Evidence | None]] = []
         self._previous: Step | None = None
+        self._named: tuple[str, Pose] | None = None  # the cause that was last written beside its mark, and where
         self._streams = [rr.RecordingStream("tussock")]
         blueprint = _blueprint(route, lost)
         self._streams[0].save(path, default_blueprint=blueprint)
@@ -63,9 +71,9 @@ class Recording:
         self._log_surroundings(world, route, title)
         self._flush()
 
-    def log(self, step: Step) -> None:
-        """Add one step. Steps are written together, those of FLUSH_SECONDS at a time."""
-        self._waiting.append(step)
+    def log(self, step: Step, evidence: Evidence | None = None) -> None:
+        """Add one step, and what a `Witness` has to say of it. Steps are written together, those of FLUSH_SECONDS at a time."""
+        self._waiting.append((step, evidence))
         if time.monotonic() - self._flushed > FLUSH_SECONDS:
             self._flush()
 
@@ -111,17 +119,40 @@ class Recording:
             # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
             values = step.familiarity[_rightwards(len(step.familiarity))] - step.familiarity.min()
             self._log("familiarity", rr.BarChart(values))
-            event = step.reason or (step.reset and f"{step.reset}: put back on the route")
-            if event:
-                level = rr.TextLogLevel.INFO if step.reason == ARRIVED else rr.TextLogLevel.WARN
-                self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
         self._previous = steps[-1]
+
+    def _send_causes(self, poor: list[tuple[Step, Evidence]]) -> None:
+        """A mark where a step is poor or failed, in the colour of its cause; the first of several close by says which."""
+        marks: dict[str, list[tuple[Step, str]]] = {}
+        for step, evidence in poor:
+            found = cause(evidence)
+            last, where = self._named or ("", step.pose)
+            close = last == found and np.hypot(step.pose.x - where.x, step.pose.y - where.y) < CLOSE
+            marks.setdefault(found, []).append((step, "" if close else found))
+            self._named = self._named if close else (found, step.pose)
+        for found, places in marks.items():
+            at, labels = [(*step.pose[:2], MARKED) for step, _ in places], [label for _, label in places]
+            columns = rr.Points3D.columns(positions=at, labels=labels, show_labels=[label != "" for label in labels])
+            self._send(_entity_of(found), [step for step, _ in places], columns)
+
+    def _log_events(self, steps: list[tuple[Step, Evidence | None]]) -> None:
+        """What became of a step, in words, where anything did."""
+        for step, evidence in steps:
+            events = [step.reset and f"{step.reset}: put back on the route", step.reason or step.failure]
+            events += [] if evidence is None else [in_words(evidence)]
+            for stream in self._streams:
+                stream.set_time(TIMELINE, sequence=step.index)
+            level = rr.TextLogLevel.INFO if step.reason == ARRIVED else rr.TextLogLevel.WARN
+            for event in filter(None, events):
+                self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
 
     def _flush(self) -> None:
         """Bring what was logged to disk; rerun by itself holds small things back until there are megabytes of them."""
-        steps, self._waiting = self._waiting, []
-        if steps:
-            self._send_steps(steps)
+        waiting, self._waiting = self._waiting, []
+        if waiting:
+            self._send_steps([step for step, _ in waiting])
+            self._send_causes([(step, evidence) for step, evidence in waiting if evidence is not None])
+            self._log_events(waiting)
         file, *viewers = self._streams
         file.flush()
         for viewer in viewers:
@@ -161,6 +192,8 @@ class Recording:
             log("world/learned_views", rr.Points3D(points, colors=LEARNED_COLOUR, radii=0.006), static=True)
         log("deviation/m", rr.SeriesLines(names="deviation from the route (m)", colors=PATH_COLOUR), static=True)
         log("error/degrees", rr.SeriesLines(names="heading error (degrees)", colors=MATCH_COLOUR), static=True)
+        for found, colour in CAUSE_COLOURS.items():
+            log(_entity_of(found), rr.Points3D.from_fields(colors=colour, radii=0.03), static=True)
         if title:
             log("about", rr.TextDocument(title, media_type="text/markdown"), static=True)
 
@@ -263,6 +296,11 @@ def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
                 viewer.kill()
 
 
+def _entity_of(cause: str) -> str:
+    """Where the marks of a cause are logged."""
+    return f"world/causes/{cause.replace(' ', '_')}"
+
+
 def _directions(headings: Float[np.ndarray, " n"], length: float) -> Float[np.ndarray, "n 3"]:
     return length * np.column_stack([np.cos(headings), np.sin(headings), np.zeros(len(headings))])
 
@@ -295,7 +333,7 @@ def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
     )
     world = rrb.Spatial3DView(
         origin="world", name="World, route (blue, to the ball) and path (red)",
-        overrides={"world/path": so_far},
+        overrides=dict.fromkeys(("world/path", *map(_entity_of, CAUSE_COLOURS)), so_far),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=[middle[0] - 0.75 * reach, middle[1] - 0.55 * reach, 0.85 * reach],
@@ -322,7 +360,12 @@ def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
         world,
         rrb.Horizontal(
             rrb.TextDocumentView(origin="about", name="About this walk"),
-            rrb.TextLogView(origin="events", name="Events"),
+            rrb.TextLogView(
+                origin="events",
+                name="Events",
+                columns=rrb.TextLogColumns(text_log_columns=["loglevel", "body"]),
+            ),
+            column_shares=[1, 1.8],
         ),
         row_shares=[3, 1],
     )

@@ -16,6 +16,7 @@ from world.files import replacing, write_route
 from world.geometry import Pose
 
 from .agent import Agent
+from .failures import Witness
 from .plots import overview
 from .recording import Recording, check_viewer, watch
 from .recording import screenshot as save_screenshot
@@ -82,11 +83,13 @@ def record_walk(
     """Walk from start and leave the walk in the folder `out`; return its summary, whose times are those of the walk alone.
 
     overwrite: replace the run that the folder holds. training_poses: of the views the model knows, in their order: shows the
-    recognised view in the recording. settings: kept in summary.json. progress(done, total): steps, of the most there can be.
+    recognised view in the recording, and where views were learned is part of the evidence of failures: without them the causes rest on what
+    else there is. settings: kept in summary.json. progress(done, total): steps, of the most there can be.
     An interrupted walk leaves its recording and trajectory, and no summary.
     """
     _claim(out, overwrite)
     world, route, trajectory = agent.renderer.world, agent.route, Trajectory()
+    witness = Witness(agent.renderer, agent.encoding, route, training_poses)
     began = time.perf_counter()
     with Recording(
         out / RECORDING,
@@ -100,8 +103,9 @@ def record_walk(
     ) as recording:
         try:
             for step in agent.walk(start):
-                recording.log(step)
-                trajectory.add(step)
+                evidence = witness.evidence(step)
+                recording.log(step, evidence)
+                trajectory.add(step, evidence)
                 progress(step.index, agent.step_limit)
         finally:
             trajectory.write(out / TRAJECTORY)

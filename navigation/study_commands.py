@@ -77,9 +77,9 @@ class StudyOptions(PathOptions):
 
     def grows(self) -> bool:
         """Whether another seed is another world or route."""
-        from world.params import PRESETS
+        from world.params import is_generated
 
-        return self.grid_database is None and (self.world in PRESETS or self.route is None)
+        return self.grid_database is None and (is_generated(self.world) or self.route is None)
 
     def all_seeds(self) -> range:
         """The seeds to repeat for."""
@@ -101,13 +101,13 @@ class StudyOptions(PathOptions):
 
     def about(self, names: tuple[str, ...]) -> dict[str, Any]:
         """What is studied, in words."""
-        from world.params import PRESETS
+        from world.params import is_generated
 
         if self.grid_database is not None:
             seen = {"Grid views": str(self.grid_database), "Route views": str(self.route_database)}
         else:
             width, height = self.width_and_height()
-            world = f"{self.world}, generated" if self.world in PRESETS else self.world
+            world = f"{self.world}, generated" if is_generated(self.world) else self.world
             seen = {
                 "World": world, "Route": "generated" if self.route is None else str(self.route),
                 "Views": f"{width} x {height} pixels, one every {100 * self.spacing_m:g} cm of the route",

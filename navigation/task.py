@@ -15,7 +15,7 @@ from render.renderer import Renderer, open_renderer
 from world.errors import InputError
 from world.files import open_world, read_route
 from world.geometry import Pose, Route
-from world.params import PRESETS
+from world.params import is_generated
 from world.scene import World
 from world.walk import check_route, generate_route
 
@@ -69,7 +69,7 @@ class RouteTask:
     def __post_init__(self):
         if self.worlds < 1:
             raise InputError(f"{self.worlds} worlds; give at least 1")
-        if self.worlds > 1 and not (self.world in PRESETS and self.route is None):
+        if self.worlds > 1 and not (isinstance(self.world, str) and is_generated(self.world) and self.route is None):
             raise InputError(f"{self.worlds} worlds are grown from a preset, with a route each; give one, and no route")
         if not (np.isfinite(self.offset) and 0 <= self.offset < self.lost):
             raise InputError(

@@ -93,8 +93,10 @@ def show(result: dict[str, Any]) -> None:
     """Print a result for people: a line a value, a line each where a value is a list, a table where the rows have names."""
     width = max(map(len, result))
     for key, value in result.items():
-        if isinstance(value, dict):
+        if isinstance(value, dict) and any(isinstance(row, dict) for row in value.values()):
             show_table(key, value)
+        elif isinstance(value, dict):
+            print(f"{key:<{width}}  {', '.join(f'{name} {text(each)}' for name, each in value.items()) or 'none'}")
         elif isinstance(value, list):
             for row in value:
                 print("  ".join(map(text, row.values())) if isinstance(row, dict) else f"{key:<{width}}  {text(row)}")

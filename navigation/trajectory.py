@@ -3,6 +3,7 @@
 import csv
 import io
 import os
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,10 +12,11 @@ from jaxtyping import Float
 from world.files import replacing
 
 from .agent import ARRIVED, Step
+from .failures import CAUSES, Evidence, cause, walk_cause
 
 COLUMNS = (
     "step", "x_m", "y_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
-    "match", "place", "reset", "reason",
+    "match", "place", "reset", "reason", "covered", "nearest_view_m", "recognised_view_m", "turning_deg", "cause",
 )  # fmt: skip
 
 
@@ -24,12 +26,13 @@ class Trajectory:
 
     rows: list[tuple] = field(default_factory=list)  # one a step, in the order of COLUMNS
 
-    def add(self, step: Step) -> None:
-        """Append one step."""
+    def add(self, step: Step, evidence: Evidence | None = None) -> None:
+        """Append one step, and what a `Witness` has to say of it."""
         self.rows.append((
             step.index, step.pose.x, step.pose.y, float(np.degrees(step.pose.heading)), float(np.degrees(step.turn)),
             float(step.familiarity.max()), step.deviation, step.along, float(np.degrees(step.error)),
             "" if step.match is None else step.match, "" if step.place is None else step.place, step.reset or "", step.reason or "",
+            *_cells(evidence),
         ))  # fmt: skip
 
     def __len__(self) -> int:
@@ -45,16 +48,23 @@ class Trajectory:
         return np.array([row[1:3] for row in self.rows]).reshape(-1, 2)
 
     def summary(self) -> dict[str, object]:
-        """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), resets."""
-        deviation = np.array(self.column("deviation_m"))
-        reason = self.column("reason")[-1]
+        """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), resets; why it failed (None where it
+        arrived without a reset), how many steps were poor or failed, and how often for each cause.
+        """
+        deviation, resets = np.array(self.column("deviation_m")), self.column("reset")
+        reason, causes = self.column("reason")[-1], self.column("cause")
+        failed = [*(reset != "" for reset in resets[1:]), reason not in ("", ARRIVED)]
+        counts = Counter(label for label in causes if label)
         return {
             "arrived": reason == ARRIVED,
             "reason": reason,
             "steps": len(self) - 1,
             "mean_deviation_m": float(deviation.mean()),
             "max_deviation_m": float(deviation.max()),
-            "resets": sum(reset != "" for reset in self.column("reset")),
+            "resets": sum(reset != "" for reset in resets),
+            "cause": walk_cause(self.column("along_m"), causes, failed),
+            "poor_steps": counts.total(),
+            "causes": {label: counts[label] for label in CAUSES if counts[label]},
         }
 
     def to_csv(self) -> str:
@@ -69,3 +79,11 @@ class Trajectory:
         """Write the steps as CSV."""
         with replacing(path) as partial:
             partial.write_text(self.to_csv(), encoding="utf-8", newline="")
+
+
+def _cells(evidence: Evidence | None) -> tuple:
+    """The last of COLUMNS; empty where nothing was poor, or not measured."""
+    if evidence is None:
+        return ("",) * 5
+    measured = (evidence.covered, evidence.nearest, evidence.recognised, float(np.degrees(evidence.turning)))
+    return (*("" if value is None else value for value in measured), cause(evidence))

@@ -321,5 +321,5 @@ def test_a_trajectory_is_its_steps(renderer, route, memory, tmp_path):
     lines = (tmp_path / "t.csv").read_text().splitlines()
     assert lines[0] == ",".join(COLUMNS)
     assert len(lines) == len(trajectory) + 1 == 7
-    assert lines[-1].endswith(OUT_OF_STEPS)
+    assert lines[-1].split(",")[COLUMNS.index("reason")] == OUT_OF_STEPS
     assert np.allclose([float(line.split(",")[1]) for line in lines[1:]], trajectory.xy[:, 0])

@@ -14,8 +14,8 @@ from scenes import views
 
 from navigation.familiarity import Model
 from navigation.models import MODELS, OPPONENT, make_model, model_class
-from navigation.spelling import split_list
 from world.errors import InputError
+from world.spelling import split_list
 
 TUSSOCK = Path(sys.executable).with_name("tussock")
 

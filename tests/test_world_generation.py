@@ -1,7 +1,9 @@
 """Laws of generated worlds and of the routes through them."""
 
+import dataclasses
 import hashlib
 import json
+import re
 import subprocess
 import sys
 from functools import cache
@@ -240,3 +242,25 @@ def test_a_world_without_room_is_refused():
 def test_a_bad_length_is_refused(length):
     with pytest.raises(InputError, match="length"):
         generate_route(grown("tiny", 1), 0, length=length)
+
+
+def test_a_world_is_spelled_with_its_parameters():
+    spelled = World.generate("tiny field_width=2.5 tussock_rgb=10,200,30 clearings=1", 4)
+    params = dataclasses.replace(PRESETS["tiny"], field_width=2.5, tussock_rgb=(10, 200, 30), clearings=1)
+    assert digest(spelled) == digest(generate_world(params, 4))
+    assert World.generate("tiny", 4).origin["preset"] == "tiny"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "unknown preset ''; known: tussock-field"),
+        ("tiny width=3", "world 'tiny width=3': tiny has no parameter 'width'; there are field_width"),
+        ("tiny field_width=900", "field_width is 900"),
+        ("tiny field_width=wide", "field_width is 'wide'; give a number in 1..50"),
+        ("tiny seed=3", "the seed is not spelled here; give it as --seed"),
+    ],
+)
+def test_a_world_that_is_misspelled_is_refused(text, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        World.generate(text, 0)

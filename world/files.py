@@ -19,7 +19,7 @@ from jaxtyping import Float
 from .colours import face_rgb, texture_of
 from .errors import InputError
 from .geometry import Bounds, Route
-from .params import PRESETS
+from .params import PRESETS, is_generated
 from .scene import Ground, World
 
 KEY = "tussock"  # under which a file carries what a mesh cannot hold
@@ -58,8 +58,8 @@ def check_writable(path: Path) -> None:
 
 
 def open_world(name: str, seed: int = 0) -> World:
-    """A world by name: a preset's, grown from the seed, or a file's. Raises InputError where it is neither."""
-    if name in PRESETS:
+    """A world by name: a preset's, which parameters may follow, grown from the seed, or a file's. Raises InputError for neither."""
+    if is_generated(name):
         return World.generate(name, seed)
     if not Path(name).suffix and not Path(name).exists():
         raise InputError(f"unknown world {name!r}; give one of {', '.join(PRESETS)}, or a file")

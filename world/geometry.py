@@ -146,6 +146,17 @@ class Route:
         heading = np.interp(distance, arc, self._unwrapped)
         return np.column_stack([x, y, wrap_angle(heading)])
 
+    def turning(self, distance, reach: float) -> Float[np.ndarray, " k"]:
+        """Change of direction at distances along the route (m), from the chord of `reach` (m) before to the one after: rad, 0 to pi.
+
+        0 nearer than `reach` to an end.
+        """
+        distance = np.atleast_1d(distance)
+        before, here, after = (self.at(distance + off)[:, :2] for off in (-reach, 0.0, reach))
+        came, goes = here - before, after - here
+        turned = np.abs(wrap_angle(np.arctan2(goes[:, 1], goes[:, 0]) - np.arctan2(came[:, 1], came[:, 0])))
+        return np.where((distance < reach) | (distance > self.length - reach), 0.0, turned)
+
     def resampled(self, spacing: float) -> "Route":
         """The route with a pose every `spacing` metres of arc length, from its start."""
         if not (np.isfinite(spacing) and 0 < spacing <= self.length):

@@ -6,6 +6,7 @@ from typing import Any
 
 from .errors import InputError
 from .scene import RGB
+from .spelling import read_parameters, split_words
 
 
 def _number(default: float | int, unit: str, low: float | int, high: float | int) -> Any:
@@ -93,6 +94,20 @@ class WorldParams:
         plain: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
         return cls(**plain)
 
+    @classmethod
+    def named(cls, text: str) -> "WorldParams":
+        """Those of a preset, which parameters may follow: "tussock-field field_width=20 tussock_density=2".
+
+        Raises InputError for unknown presets and parameters, and for values out of range.
+        """
+        name, *words = split_words(text) or [""]
+        if name not in PRESETS:
+            raise InputError(f"unknown preset {name!r}; known: {', '.join(PRESETS)}")
+        try:
+            return dataclasses.replace(PRESETS[name], **read_parameters(words, name, cls))
+        except InputError as error:
+            raise InputError(f"world {text!r}: {error}") from error
+
     def to_dict(self) -> dict[str, Any]:
         """The parameters as plain JSON types."""
         return {name: list(v) if isinstance(v, tuple) else v for name, v in dataclasses.asdict(self).items()}
@@ -135,3 +150,8 @@ PRESETS: dict[str, WorldParams] = {
         stone_density=0.0, trees=7, tree_height=1.3, tree_distance=0.9, tree_leaves=8,
     ),
 }  # fmt: skip
+
+
+def is_generated(world: str) -> bool:
+    """Whether a world that is called so is grown, from a preset, rather than read from a file."""
+    return next(iter(world.split()), "") in PRESETS

@@ -62,17 +62,16 @@ class World:
 
     @classmethod
     def generate(cls, params: "WorldParams | str" = "tussock-field", seed: int = 0) -> "World":
-        """Grow a world from parameters, or from a preset by its name. The same seed gives the same bytes.
+        """Grow a world from parameters, or from a preset by its name, which parameters may follow (see `WorldParams.named`).
 
-        Raises InputError for an unknown preset (lists the known) or a seed that is no whole number from 0.
+        The same seed gives the same bytes. Raises InputError for an unknown preset (lists the known) or a seed that is no whole
+        number from 0.
         """
         from .generate import generate_world
-        from .params import PRESETS
+        from .params import WorldParams
 
         if isinstance(params, str):
-            if params not in PRESETS:
-                raise InputError(f"unknown preset {params!r}; known: {', '.join(PRESETS)}")
-            params = PRESETS[params]
+            params = WorldParams.named(params)
         return generate_world(params, seed)
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:

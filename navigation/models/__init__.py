@@ -4,9 +4,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from world.errors import InputError
+from world.spelling import read_parameters, split_words
 
 from ..familiarity import Model
-from ..spelling import read_parameters, split_words
 
 if TYPE_CHECKING:
     from .adaboost import AdaBoost
@@ -82,7 +82,7 @@ def make_model(name: str, **parameters) -> Model:
     name, *words = split_words(text := name) or [""]
     try:
         cls = model_class(name.removeprefix(OPPONENT))
-        spelled = read_parameters(words, cls)
+        spelled = read_parameters(words, cls.name, cls)
         if twice := spelled.keys() & parameters.keys():
             raise InputError(f"{', '.join(sorted(twice))} is also given as a keyword; give it once")
         model = cls(**spelled, **parameters)

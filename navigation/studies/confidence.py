@@ -6,13 +6,14 @@ from scipy.special import expit
 
 from world.geometry import wrap_angle
 
+from ..evaluation import RECOVERED_DEG
 from ..familiarity import Images
 from ..models import MLP
 from . import published
 from .classifier import learned_views
 from .corners import corner_views
 from .findings import Claim, Findings
-from .headings import RECOVERED_DEG, around_set_heading, errors_of, headings
+from .headings import around_set_heading, errors_of, headings
 from .material import Material
 from .settings import ENCODING, Settings
 

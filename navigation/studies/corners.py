@@ -8,18 +8,19 @@ import pandas as pd
 from jaxtyping import Float, Int
 from scipy.stats import spearmanr
 
-from world.geometry import Route, wrap_angle
+from world.geometry import Route
 
 from ..encoding import Encoding
+from ..evaluation import RECOVERED_DEG
+from ..failures import REACH
 from . import published
 from .classifier import learned_views, train_and_test
 from .findings import Claim, Findings
 from .grid_search import best_tuning, search
-from .headings import RECOVERED_DEG, middle
+from .headings import middle
 from .material import Material
 from .settings import ENCODING, EVERY, Settings
 
-REACH = 0.3  # m; turning at a place is the change of direction from so far before to so far after
 SHARE = 0.2  # of the route at most: the part of it that turns the most is its corners ..
 LEAST = math.radians(10)  # .. where it turns this much
 MARGIN = 0.4  # m of straight route shown on both sides of the corners looked at
@@ -28,11 +29,7 @@ RAW = Encoding.parse("grey")
 
 def turning(route: Route) -> Float[np.ndarray, " n"]:
     """Change of direction at each point of a route (rad, 0 to pi), from the chord of REACH before it to the one after it."""
-    arc, xy = route.arc, route.xy
-    before, after = route.at(arc - REACH)[:, :2], route.at(arc + REACH)[:, :2]
-    came, goes = xy - before, after - xy
-    turned = np.abs(wrap_angle(np.arctan2(goes[:, 1], goes[:, 0]) - np.arctan2(came[:, 1], came[:, 0])))
-    return np.where((arc < REACH) | (arc > route.length - REACH), 0.0, turned)
+    return route.turning(route.arc, REACH)
 
 
 def corner_views(route: Route) -> Int[np.ndarray, " k"]:

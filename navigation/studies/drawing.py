@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from world.geometry import Bounds, Route
 from world.scene import World
 
+from ..evaluation import RECOVERED_DEG
 from ..plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, draw_world
-from .headings import RECOVERED_DEG
 
 GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
 ARROW = 0.16  # m

@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..evaluation import RECOVERED_DEG
 from ..plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR
 from .drawing import (
     GOOD_COLOUR,
@@ -18,7 +19,6 @@ from .drawing import (
     plans,
 )
 from .findings import Findings
-from .headings import RECOVERED_DEG
 from .material import Material
 from .pictures import picture
 

@@ -7,11 +7,9 @@ import pandas as pd
 
 from world.geometry import turn_of_columns, wrap_angle
 
-from ..evaluation import BATCH, errors_on
+from ..evaluation import BATCH, RECOVERED_DEG, errors_on
 from ..familiarity import FamiliarityModel, Images
 from .material import Material
-
-RECOVERED_DEG = 45.0  # a heading less than this off counts as recovered
 
 
 def headings(

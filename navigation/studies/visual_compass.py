@@ -8,10 +8,11 @@ from scipy.stats import spearmanr
 from world.geometry import wrap_angle
 
 from ..encoding import Encoding
+from ..evaluation import RECOVERED_DEG
 from ..models import make_model
 from ..rotation import best_turn
 from .findings import Claim, Findings
-from .headings import RECOVERED_DEG, around_set_heading
+from .headings import around_set_heading
 from .material import Material
 from .settings import Settings
 

@@ -15,7 +15,7 @@ from types import NoneType
 from typing import Any
 
 from world.errors import InputError
-from world.params import PRESETS
+from world.params import is_generated
 
 from ..learning_options import FILE_SUFFIX, RunOptions
 
@@ -169,7 +169,7 @@ class _Reader:
 
     def value(self, name: str, value: Any, kinds: tuple[type, ...]) -> Any:
         """A value as the flag has it; file names as they are from where we are."""
-        if name == "world" and Path(value).suffix and value not in PRESETS:
+        if name == "world" and Path(value).suffix and not is_generated(value):
             return str(self.path.parent / value)
         if name == "model" and value.endswith(FILE_SUFFIX):
             return str(self.path.parent / value)

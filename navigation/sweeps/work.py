@@ -14,7 +14,7 @@ import numpy as np
 
 from render.renderer import Renderer, open_renderer
 from world.geometry import Route
-from world.params import PRESETS
+from world.params import is_generated
 from world.scene import World
 
 from ..learning_options import LearningOptions, Lesson, RunOptions
@@ -103,7 +103,7 @@ def _digest(options: RunOptions, names: set[str]) -> str:
         del settings["seed"]  # of which nothing else here depends
     if options.route is not None:
         settings |= {"route": _content(options.route), "route_seed": None, "route_length_m": None}
-    if options.world not in PRESETS:
+    if not is_generated(options.world):
         settings |= {"world": _content(Path(options.world)), "world_seed": None}
     if "model" in names and Path(options.model).is_file():
         settings["model"] = _content(Path(options.model))

@@ -1,19 +1,19 @@
-"""A model in words: its name, and the parameters that it is to have, as in `mushroom-body inputs=10 cells=20000`."""
+"""A model or a world in words: its name, and the parameters that it is to have, as in `mushroom-body inputs=10 cells=20000`."""
 
 import dataclasses
 import re
 from collections.abc import Mapping
 from typing import Any
 
-from world.errors import InputError
+from .errors import InputError
 
-ELSEWHERE = ("seed", "device")  # what every model takes and no spelling holds: they are flags of the command line
+ELSEWHERE = ("seed", "device")  # no spelling holds them: they are flags of the command line
 CONSTANTS = {"true": True, "false": False, "none": None}
 
 
-def own_parameters(model: type) -> dict[str, Any]:
-    """The parameters of a model's class that can be spelled, with their defaults."""
-    return {f.name: f.default for f in dataclasses.fields(model) if f.init and f.name not in ELSEWHERE}
+def own_parameters(kind: Any) -> dict[str, Any]:
+    """The parameters of a dataclass that can be spelled, with their defaults."""
+    return {f.name: f.default for f in dataclasses.fields(kind) if f.init and f.name not in ELSEWHERE}
 
 
 def split_words(text: str) -> list[str]:
@@ -26,21 +26,21 @@ def split_list(text: str) -> list[str]:
     return [part.strip() for part in re.split(r",(?![^()]*\))", text)]
 
 
-def read_parameters(words: list[str], model: type) -> dict[str, Any]:
-    """The parameters of a model's class that words such as `rate=0.1` give. Raises InputError where they give none of its.
+def read_parameters(words: list[str], name: str, kind: Any) -> dict[str, Any]:
+    """The parameters of a dataclass that words such as `rate=0.1` give. Raises InputError where they give none of its.
 
-    What the values mean is for `Model.check_parameters` to say.
+    What the values mean is for the dataclass to say. name: that people know it by.
     """
-    own = own_parameters(model)
+    own = own_parameters(kind)
     parameters = {}
     for word in words:
         key, _, value = word.partition("=")
         if not (key and value):
             raise InputError(f"{word!r} is no parameter; give name=value, without spaces")
         if key in ELSEWHERE:
-            raise InputError(f"the {key} is not spelled with the model; give it as --{key}, in Python as {key}=")
+            raise InputError(f"the {key} is not spelled here; give it as --{key}, in Python as {key}=")
         if key not in own:
-            raise InputError(f"{model.name} has no parameter {key!r}; there are {', '.join(own) or 'none'}")
+            raise InputError(f"{name} has no parameter {key!r}; there are {', '.join(own) or 'none'}")
         if key in parameters:
             raise InputError(f"{key} is given twice; give it once")
         parameters[key] = read_value(value, own[key])
@@ -72,9 +72,9 @@ def read_single(text: str, whole: bool) -> Any:
         return CONSTANTS.get(text, text)
 
 
-def spell(name: str, parameters: Mapping[str, Any], model: type) -> str:
-    """A model's name and those of its parameters that are not the defaults of its class: what `make_model` reads."""
-    own = own_parameters(model)
+def spell(name: str, parameters: Mapping[str, Any], kind: Any) -> str:
+    """A name, and those of its parameters that are not the defaults of the dataclass: what `read_parameters` reads."""
+    own = own_parameters(kind)
     words = [f"{key}={spell_value(parameters[key])}" for key in own if parameters[key] != own[key]]
     return " ".join([name, *words])
 
