@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .agent import Agent, Step
     from .encoding import Encoding
     from .evaluation import grid_positions, heading_errors
+    from .failures import Witness
     from .familiarity import FamiliarityModel
     from .model_files import load_model, save_model
     from .models import (
@@ -52,6 +53,7 @@ __all__ = [
     "Step",
     "Trajectory",
     "VisualCompass",
+    "Witness",
     "grid_positions",
     "heading_errors",
     "learn",
@@ -67,6 +69,7 @@ _HOMES = {  # of all but the models
     "agent": ("Agent", "Step"),
     "encoding": ("Encoding",),
     "evaluation": ("grid_positions", "heading_errors"),
+    "failures": ("Witness",),
     "familiarity": ("FamiliarityModel",),
     "model_files": ("load_model", "save_model"),
     "recording": ("Recording",),

@@ -35,9 +35,9 @@ from .failures import ALIASING, CORNER, OCCLUSION, OFF_CATCHMENT, UNEXPLAINED, U
 TIMELINE = "step"
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
-CAUSE_COLOURS = {
-    OCCLUSION: (20, 20, 20), OFF_CATCHMENT: (125, 60, 230), ALIASING: (255, 70, 190), UNLEARNED: (255, 225, 0), CORNER: (0, 220, 220),
-    UNEXPLAINED: (150, 150, 150),
+CAUSE_COLOURS = {  # names are written in them on dark grey
+    OCCLUSION: (185, 130, 255), OFF_CATCHMENT: (255, 255, 255), ALIASING: (255, 110, 205), UNLEARNED: (255, 225, 0), CORNER: (0, 225, 225),
+    UNEXPLAINED: (185, 185, 185),
 }  # fmt: skip
 FLUSH_SECONDS = 0.5  # what a crash may lose of a recording
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible ..
@@ -365,7 +365,7 @@ def _blueprint(route: Route, lost: float) -> rrb.Blueprint:
                 name="Events",
                 columns=rrb.TextLogColumns(text_log_columns=["loglevel", "body"]),
             ),
-            column_shares=[1, 1.8],
+            column_shares=[1, 2.2],
         ),
         row_shares=[3, 1],
     )
