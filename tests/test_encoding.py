@@ -20,8 +20,11 @@ CHAINS = [
     "grey | sample 3",
     "sky-mask | vertical-edges",
     "grey | normalise",
+    "grey | invert",
     "sky-mask | blur 2 | vertical-edges | resize 3 | normalise",
 ]
+# With tiles, which turn with the eye.
+EQUALISED = ["grey | clahe 2 4", "grey | invert | clahe 3.5 4 | resize 3", "sky-mask | clahe 40 1"]
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +41,24 @@ def test_rolling_the_view_rolls_the_features(views, chain):
     assert np.allclose(rolled, np.roll(encoding(views).numpy(), 5, axis=2), atol=1e-5)
 
 
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("chain", EQUALISED)
+def test_rolling_the_view_by_whole_tiles_rolls_the_equalised(views, chain):
+    encoding = Encoding.parse(chain)
+    tiles = int(encoding.steps[-1].tiles if "resize" not in chain else encoding.steps[-2].tiles)
+    features = encoding(views).numpy()
+    for turned in range(1, tiles + 1):
+        rolled = encoding(np.roll(views, turned * 120 // tiles, axis=2)).numpy()
+        away = np.abs(rolled - np.roll(features, turned * features.shape[2] // tiles, axis=2))
+        assert away.max() < 1.01 / 255
+        assert away.mean() < 1e-5  # a level here and there, where the sum of four tiles' is midway between two
+
+
+@pytest.mark.parametrize("chain", CHAINS + EQUALISED)
 def test_a_chain_is_its_text(chain):
     assert str(Encoding.parse(chain)) == chain
 
 
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("chain", CHAINS + EQUALISED)
 def test_a_batch_equals_its_views_one_by_one(views, chain):
     encoding = Encoding.parse(chain)
     assert np.allclose(encoding(views), np.concatenate([encoding(view[None]) for view in views]), atol=1e-6)
@@ -84,6 +99,49 @@ def test_edges_are_what_a_loop_finds(views):
         assert np.allclose(edges[..., column], abs(mask[..., (column + 1) % 120] - mask[..., column]), atol=1e-6)
 
 
+def test_inverting_is_its_own_inverse_and_makes_white_black(views):
+    grey = Encoding.parse("grey")(views)
+    assert np.allclose(Encoding.parse("grey | invert")(views), 1 - grey, atol=1e-6)
+    assert np.allclose(Encoding.parse("grey | invert | invert")(views), grey, atol=1e-6)
+
+
+@pytest.mark.parametrize(("clip", "tiles"), [(2, 4), (0.5, 5), (40, 2), (256, 3)])
+def test_equalised_images_are_opencvs_of_the_ring_laid_out_thrice(views, clip, tiles):
+    views = views[:, : 30 // tiles * tiles]  # else OpenCV makes other tiles
+    levels = np.rint(Encoding.parse("grey")(views).numpy() * 255).astype(np.uint8)
+    thrice = cv2.createCLAHE(clip, (3 * tiles, tiles))
+    theirs = np.stack([thrice.apply(np.tile(image, 3))[:, 120:240] for image in levels]) / np.float32(255)
+    ours = Encoding.parse(f"grey | clahe {clip} {tiles}")(views).numpy()
+    assert np.abs(ours - theirs).max() < 1.01 / 255
+    assert np.abs(ours - theirs).mean() < 1e-5  # a level here and there, by rounding
+    # And, but near the seam, of the image as it is.
+    once = np.stack([cv2.createCLAHE(clip, (tiles, tiles)).apply(image) for image in levels]) / np.float32(255)
+    half = 60 // tiles
+    assert np.abs(ours - once)[:, :, half : 120 - half].mean() < 1e-5
+    assert np.abs(ours - once).max() > 0.01
+
+
+def test_rows_that_are_no_whole_tiles_are_mirrored_below(views):
+    cut = views[:, :29]
+    mirrored = np.concatenate([cut, cut[:, [27, 26, 25]]], axis=1)
+    whole = Encoding.parse("grey | clahe 2 4")(mirrored)
+    assert np.array_equal(Encoding.parse("grey | clahe 2 4")(cut), whole[:, :29])
+
+
+def test_equalising_spreads_a_ramp_as_far_as_the_limit_lets_it():
+    ramp = np.broadcast_to(np.arange(96, 128, dtype=np.uint8)[:, None, None], (1, 32, 32, 3))
+    spread = [np.ptp(Encoding.parse(f"grey | clahe {clip} 1")(ramp).numpy()) for clip in (1, 4, 256)]
+    # Of 1024 pixels 32 have each level. A level holds 4 clip of them at most, what is clipped is dealt out to all 256 alike.
+    assert np.allclose(
+        spread, [31 * (4 * clip + (1024 - 32 * 4 * clip) / 256) / 1024 for clip in (1, 4)] + [31 / 32], atol=0.01
+    )
+
+
+def test_tiles_that_do_not_divide_the_columns_are_refused(views):
+    with pytest.raises(InputError, match=r"clahe 2 7: 120 columns are no 7 equal tiles; give a divisor of 120"):
+        Encoding.parse("grey | clahe 2 7")(views)
+
+
 def test_normalised_images_have_mean_0_and_variance_1_and_blank_ones_are_0(views):
     features = Encoding.parse("grey | normalise")(views).numpy()
     assert np.allclose(features.mean(axis=(1, 2)), 0, atol=1e-5)
@@ -110,6 +168,15 @@ def test_presets_are_chains(name, views):
         ("grey | normalise 3", "normalise takes no number"),
         ("grey | resize 0.5", "factor from 1"),
         ("grey | blur nan", "standard deviation"),
+        ("grey | invert 1", "invert takes no number"),
+        ("grey | clahe 2", "clahe takes 2 numbers, got 'clahe 2'"),
+        ("grey | clahe 0 8", "clip limit over 0"),
+        ("grey | clahe nan 8", "clip limit over 0"),
+        ("grey | clahe 2 0", "whole number of tiles"),
+        ("grey | clahe 2 2.5", "whole number of tiles"),
+        ("grey | clahe 2 nan", "whole number of tiles"),
+        ("grey | normalise | invert", "invert takes values from 0 to 1; put it before normalise"),
+        ("grey | normalise | resize 2 | clahe 2 4", "clahe takes values from 0 to 1"),
         ("grey |", "cannot go on with ''"),
     ],
 )
@@ -127,3 +194,11 @@ def test_a_chain_takes_no_resize_beside_it():
 def test_any_view_gives_finite_features(height, width, channels, level, chain):
     features = Encoding.parse(chain)(np.full((2, height, width, channels), level, np.uint8))
     assert np.isfinite(features.numpy()).all()
+
+
+@given(st.integers(1, 12), st.integers(1, 6), st.integers(1, 5), st.integers(0, 255))
+def test_any_view_is_equalised_to_values_from_0_to_1(height, tiles, wide, level):
+    view = np.full((2, height, tiles * wide, 3), level, np.uint8)
+    features = Encoding.parse(f"grey | clahe 2 {tiles}")(view).numpy()
+    assert features.shape == view.shape[:3]
+    assert ((features >= 0) & (features <= 1)).all()
