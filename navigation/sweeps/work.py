@@ -10,13 +10,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from render.renderer import Renderer, open_renderer
 from world.geometry import Route
 from world.params import is_generated
 from world.scene import World
 
+from ..failures import CAUSES, Witness
 from ..learning_options import LearningOptions, Lesson, RunOptions
 from ..options import PathOptions
 from ..threads import use_threads
@@ -28,11 +27,12 @@ _NOT_OF_PATH = {"size", "renderer", "samples", "eye_height_m", "top_deg", "botto
 
 @dataclass(frozen=True, kw_only=True)
 class Taught:
-    """A lesson that was learned, what draws its world, and the poses of the views that the model knows (None: not known)."""
+    """A lesson that was learned, what draws its world, who says why walks fail there, and how many views the model knows."""
 
     lesson: Lesson
     renderer: Renderer
-    poses: np.ndarray | None
+    witness: Witness
+    n_views: int | None
     seconds: float
 
 
@@ -62,7 +62,9 @@ def teach(options: RunOptions, path: tuple[World, Route]) -> Taught:
     lesson = options.prepare(path)
     renderer = open_renderer(lesson.world, options.eye(), options.renderer, threads=options.threads)
     poses = lesson.teach(renderer)
-    return Taught(lesson=lesson, renderer=renderer, poses=poses, seconds=time.perf_counter() - began)
+    witness = Witness(renderer, lesson.encoding, lesson.route, poses)
+    seconds, n_views = time.perf_counter() - began, None if poses is None else len(poses)
+    return Taught(lesson=lesson, renderer=renderer, witness=witness, n_views=n_views, seconds=seconds)
 
 
 def walk(options: RunOptions, taught: Taught) -> Walked:
@@ -72,8 +74,10 @@ def walk(options: RunOptions, taught: Taught) -> Walked:
         use_threads(options.threads)
     agent, trajectory = options.agent(taught.renderer, taught.lesson), Trajectory()
     for step in agent.walk(agent.start(options.offset_m)):
-        trajectory.add(step)
-    found = trajectory.summary() | {"n_views": None if taught.poses is None else len(taught.poses)}
+        trajectory.add(step, taught.witness.evidence(step))
+    found = trajectory.summary() | {"n_views": taught.n_views}
+    causes = found.pop("causes")
+    found |= {f"{label.replace(' ', '_')}_steps": causes.get(label, 0) for label in CAUSES}
     seconds = time.perf_counter() - began
     return Walked(found=found, steps=trajectory.to_csv(), seconds=seconds, learn_seconds=taught.seconds)
 
