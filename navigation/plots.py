@@ -1,4 +1,4 @@
-"""Pictures for people. Only this module and the drawing, figures and report of `studies` import matplotlib."""
+"""Pictures for people. Only this module, the pages, and the drawing and figures of `studies` import matplotlib."""
 
 import os
 from collections.abc import Sequence

@@ -5,6 +5,7 @@ import io
 import os
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -47,7 +48,7 @@ class Trajectory:
         """Positions (m)."""
         return np.array([row[1:3] for row in self.rows]).reshape(-1, 2)
 
-    def summary(self) -> dict[str, object]:
+    def summary(self) -> dict[str, Any]:
         """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), resets; why it failed (None where it
         arrived without a reset), how many steps were poor or failed, and how often for each cause.
         """

@@ -13,6 +13,7 @@ from sklearn.model_selection import ParameterGrid
 
 from navigation.encoding import Encoding
 from navigation.models import make_model
+from navigation.pages import cell
 from navigation.studies import published
 from navigation.studies.classifier import FIRST, held_out_views
 from navigation.studies.confidence import _chance
@@ -22,7 +23,6 @@ from navigation.studies.grid_search import share_of
 from navigation.studies.headings import box_of, errors_of, headings
 from navigation.studies.material import Material, material_of_databases, material_of_world
 from navigation.studies.settings import Settings
-from navigation.studies.tables import cell
 from navigation.studies.thesis import STUDIES, run_studies
 from navigation.studies.visual_compass import _minima
 from render.database_writing import Grid, published_part, write_database

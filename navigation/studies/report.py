@@ -1,31 +1,24 @@
 """The report of a replication: figures, results.json, and one HTML page that holds everything."""
 
-import base64
-import io
 import json
 from collections.abc import Collection
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-import jinja2
-import matplotlib
-from PIL import Image
-
 from world.errors import InputError
 from world.files import replacing
 
+from ..pages import cell, page, picture
 from . import published
 from .figures import PICTURES, Picture
 from .findings import Claim, Findings, plain
 from .material import Material
-from .tables import LISTINGS, Listing, cell
+from .tables import LISTINGS, Listing
 from .thesis import STUDIES
 
 REPORT, RESULTS, FIGURES = "report.html", "results.json", "figures"
-DPI = 130
 Runs = dict[int, dict[str, Findings]]  # findings of each study, by seed
 
 
@@ -165,19 +158,7 @@ def _exhibit_of(verdict: Verdict) -> Picture | Listing:
 
 def _draw(each: Picture, findings: Findings, material: Material, folder: Path) -> dict[str, Any]:
     """Draw a figure into its files; give the PNG for the page."""
-    figure = each.draw(findings, material)
-    data = io.BytesIO()
-    figure.savefig(data, dpi=DPI, format="png")
-    with replacing(folder / f"{_name(each)}.png") as partial:
-        partial.write_bytes(data.getvalue())
-    with matplotlib.rc_context({"svg.hashsalt": "tussock"}), replacing(folder / f"{_name(each)}.svg") as partial:
-        figure.savefig(partial, format="svg", metadata={"Date": None})
-    width, height = Image.open(data).size
-    return {
-        "image": base64.b64encode(data.getvalue()).decode("ascii"),
-        "width": round(width * 96 / DPI),
-        "height": round(height * 96 / DPI),
-    }
+    return picture(each.draw(findings, material), folder, _name(each))
 
 
 def _shown(verdict: Verdict) -> dict[str, Any]:
@@ -230,25 +211,8 @@ PUBLISHED: dict[str, dict[str, Any]] = {  # what the thesis gives beside its cla
 
 
 def _page(parts: list[dict], judged: list[Verdict], runs: Runs, about: dict[str, Any], title: str) -> str:
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters |= {"cell": cell, "spread": _spread_text, "label": lambda label: label.replace("(deg)", "(°)")}
-    template = environment.from_string(files(__package__).joinpath("report.html").read_text(encoding="utf-8"))
     lead = (
         "Every figure and table of the study, done again: the published number, the one found here, and what follows."
     )
-    return template.render(
-        title=title,
-        lead=lead,
-        about=about,
-        claims=[_shown(verdict) for verdict in judged],
-        parts=parts,
-        seeds=list(runs),
-    )
-
-
-def _spread_text(spread: tuple[float, float, float]) -> str:
-    """A number, and its range where seeds differ."""
-    middle, low, high = spread
-    return cell(middle) if low == high or middle != middle else f"{cell(middle)} ({cell(low)} to {cell(high)})"
+    claims = [_shown(verdict) for verdict in judged]
+    return page("thesis.html", title=title, lead=lead, about=about, claims=claims, parts=parts, seeds=list(runs))

@@ -147,22 +147,3 @@ LISTINGS = [
         rows=_whole("by_model"),
     ),
 ]
-
-
-def cell(value: object) -> str:
-    """A number as people read it."""
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        if value != value:
-            return "–"
-        return (
-            f"{value:.0f}"
-            if value == int(value) and abs(value) >= 10
-            else f"{value:.3g}"
-            if abs(value) < 100
-            else f"{value:.0f}"
-        )
-    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)

@@ -75,7 +75,7 @@ def walk(options: RunOptions, taught: Taught) -> Walked:
     agent, trajectory = options.agent(taught.renderer, taught.lesson), Trajectory()
     for step in agent.walk(agent.start(options.offset_m)):
         trajectory.add(step, taught.witness.evidence(step))
-    found = trajectory.summary() | {"n_views": taught.n_views}
+    found: dict[str, Any] = trajectory.summary() | {"n_views": taught.n_views}
     causes = found.pop("causes")
     found |= {f"{label.replace(' ', '_')}_steps": causes.get(label, 0) for label in CAUSES}
     seconds = time.perf_counter() - began
