@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from world.errors import InputError
-from world.geometry import Pose
+from world.geometry import FARTHEST, Pose
 from world.scene import World
 
 from .eye import Eye
@@ -34,7 +34,7 @@ class Renderer(Protocol):
         """Panoramas at poses (x [m], y [m], heading [rad]); one pose is a batch of one.
 
         Colour is the average over each pixel's solid angle, the sky included; alpha is the share of the pixel
-        that something covers (255: all of it, 0: open sky). Raises InputError for poses that are not finite.
+        that something covers (255: all of it, 0: open sky). Raises InputError for poses that are not finite, or beyond FARTHEST.
         """
         ...
 
@@ -73,12 +73,16 @@ def open_renderer(
 
 def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
     """Poses as a finite (n, 3) float64 array. Raises InputError otherwise."""
-    array = np.asarray(poses, dtype=np.float64)
+    try:
+        array = np.asarray(poses, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"poses are rows of x, y, heading, all numbers ({error})") from error
     if array.size == 0:
         array = array.reshape(0, 3)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"poses are rows of x, y, heading; got an array of shape {array.shape}")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise InputError(f"pose {row} is {array[row].tolist()}; a pose needs finite numbers")
+    near = np.abs(array) <= FARTHEST  # False for nan, too
+    if not near.all():
+        row = int(near.all(axis=1).argmin())
+        raise InputError(f"pose {row} is {array[row].tolist()}; a pose needs finite numbers up to {FARTHEST:g}")
     return array

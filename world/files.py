@@ -18,12 +18,14 @@ from jaxtyping import Float
 
 from .colours import face_rgb, texture_of
 from .errors import InputError
-from .geometry import Bounds, Route
+from .geometry import FARTHEST, Bounds, Route
 from .params import PRESETS, is_generated
 from .scene import Ground, World
 
 KEY = "tussock"  # under which a file carries what a mesh cannot hold
 DEFAULT_SKY = (191, 191, 191)
+MOST_TRIANGLES = 10**7  # of a world: a few hundred bytes each while it is read
+ARCHIVES = ("zip", "bz2", "gz")  # trimesh would unpack them, however large what is in them
 
 # How the original program draws its worlds: green vegetation on sand (sussex/README.md has the frames it drew).
 ANTWORLD_TINT = (0.0, 1.0, 0.0)
@@ -69,36 +71,57 @@ def open_world(name: str, seed: int = 0) -> World:
 def read_world(path: str | os.PathLike) -> World:
     """Read a world: `.bin` (AntWorld) or any mesh trimesh reads; GLB and PLY written by `write_world` come back whole.
 
-    Raises InputError where the file is missing, damaged, or holds no triangles.
+    Raises InputError where the file is missing, damaged, or holds no triangles, or over MOST_TRIANGLES.
     """
     path = _existing(path, "world")
-    if path.suffix.lower() == ".bin":
-        return _read_antworld(path)
+    try:
+        with np.errstate(all="ignore"):  # whatever the file holds: a world refuses what is not finite
+            return _read_antworld(path) if path.suffix.lower() == ".bin" else _read_mesh(path)
+    except InputError as error:
+        raise _naming(path, error) from error
+
+
+def _read_mesh(path: Path) -> World:
     import trimesh  # late: half a second that a generated world does not need
 
-    if path.suffix.lower().lstrip(".") not in trimesh.available_formats():
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in trimesh.available_formats() or kind in ARCHIVES:
         raise InputError(f"{path}: unknown kind of world {path.suffix!r}; give .glb, .ply, .obj, .stl or AntWorld .bin")
     try:
+        if kind == "glb":
+            _check_accessors(path)
         scene = trimesh.load_scene(path, process=False)
-        meshes = [mesh for mesh in _in_order(scene) if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
-    except Exception as error:  # trimesh's readers raise whatever their parsers do
+        meshes = _in_order(scene)
+        triangles = np.concatenate([mesh.triangles for mesh in meshes] or [np.empty((0, 3, 3))]).astype(np.float32)
+        rgb = np.concatenate([face_rgb(mesh) for mesh in meshes] or [np.empty((0, 3), np.uint8)])
+        textured = tuple(meshes) if any(texture_of(mesh) is not None for mesh in meshes) else ()
+        kept = scene.metadata.get(KEY) if kind != "ply" else _read_ply_comment(path)
+    except InputError:
+        raise
+    except Exception as error:  # trimesh's readers, and those of its textures, raise whatever their parsers do
         raise InputError(f"{path} cannot be read as a mesh ({_reason(error)}); is it complete?") from error
-    if not meshes:
+    if len(triangles) == 0:
         raise InputError(f"{path} holds no triangles; a world needs some")
-    kept = scene.metadata.get(KEY) if path.suffix.lower() != ".ply" else _read_ply_comment(path)
-    triangles = np.concatenate([mesh.triangles for mesh in meshes]).astype(np.float32)
-    rgb = np.concatenate([face_rgb(mesh) for mesh in meshes])
-    textured = tuple(meshes) if any(texture_of(mesh) is not None for mesh in meshes) else ()
     if kept is None:
         corners = triangles.reshape(-1, 3)[:, :2].astype(float)
         field = Bounds(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
         return World(triangles=triangles, rgb=rgb, ground=None, sky_rgb=DEFAULT_SKY, field=field, textured=textured)
     try:
         return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(kept))
-    except (KeyError, TypeError, ValueError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"{path}: its {KEY} metadata cannot be used ({_reason(error)}); write the world again"
         ) from error
+
+
+def _check_accessors(path: Path) -> None:
+    """Refuse a GLB whose accessors point to no data, which are read as zeros, where they say that there is much of it."""
+    with path.open("rb") as file:
+        length = int.from_bytes(file.read(20)[12:16], "little")
+        tree = json.loads(file.read(length))
+    empty = sum(accessor["count"] for accessor in tree.get("accessors", []) if "bufferView" not in accessor)
+    if not empty <= 3 * MOST_TRIANGLES:
+        raise InputError(f"{path} says that it has {empty} corners and holds none of them; write it again")
 
 
 def write_world(world: World, path: str | os.PathLike) -> None:
@@ -158,8 +181,7 @@ def read_route(path: str | os.PathLike) -> Route:
     except csv.Error as error:
         raise InputError(f"{path} cannot be read as CSV ({error}); is it a route?") from error
     except InputError as error:
-        message = str(error)
-        raise error if message.startswith(str(path)) else InputError(f"{path}: {message}") from error
+        raise _naming(path, error) from error
 
 
 def write_route(route: Route, path: str | os.PathLike) -> None:
@@ -175,9 +197,15 @@ def write_route(route: Route, path: str | os.PathLike) -> None:
 
 def _existing(path: str | os.PathLike, kind: str) -> Path:
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # False for names too long, too
         raise InputError(f"there is no {kind} file {path}; check the name")
     return path
+
+
+def _naming(path: Path, error: InputError) -> InputError:
+    """The error, with the file that it is about."""
+    message = str(error)
+    return error if message.startswith(str(path)) else InputError(f"{path}: {message}")
 
 
 def _reason(error: Exception) -> str:
@@ -195,10 +223,10 @@ def _read_planes(path: Path, planes: int, what: str) -> Float[np.ndarray, "plane
 def _read_antworld(path: Path) -> World:
     """An AntWorld `.bin`: planes x0 x1 x2 y0 y1 y2 z0 z1 z2 R G B, drawn in green on sand as its own program does."""
     planes = _read_planes(path, 12, "an AntWorld world")
-    bad = np.flatnonzero(~np.isfinite(planes).all(axis=0))
+    bad = np.flatnonzero(~(np.abs(planes) <= FARTHEST).all(axis=0))
     if len(bad):
         raise InputError(
-            f"{path}: triangle {bad[0]} holds a number that is not finite; a world needs finite metres and colours"
+            f"{path}: triangle {bad[0]} holds a number that is not finite, or over {FARTHEST:g}; a world needs metres and colours"
         )
     shade = planes[9:]
     if shade.min() < 0 or shade.max() > 1:
@@ -258,6 +286,8 @@ def _to_json(world: World) -> dict[str, Any]:
 
 
 def _from_json(kept: dict[str, Any]) -> dict[str, Any]:
+    if not isinstance(kept, dict) or not isinstance(kept["double_sided"], bool):
+        raise TypeError("it is no description of a world")
     if kept["version"] != 1:
         raise InputError(f"written by a newer version ({kept['version']})")
     ground = kept["ground"]
@@ -275,7 +305,7 @@ def _read_ply_comment(path: Path) -> dict[str, Any] | None:
             if line.startswith(start):
                 try:
                     return json.loads(line[len(start) :])
-                except ValueError as error:
+                except (ValueError, RecursionError) as error:
                     raise InputError(f"{path}: its {KEY} comment is damaged; write the world again") from error
             if line.startswith(b"end_header"):
                 break
@@ -284,9 +314,12 @@ def _read_ply_comment(path: Path) -> dict[str, Any] | None:
 
 def _in_order(scene) -> list:
     """A scene's meshes where they stand, in the order of their names, which is the order they were written in."""
+    places = [scene.graph[node] for node in sorted(scene.graph.nodes_geometry)]
+    faces = [len(getattr(scene.geometry[name], "faces", ())) for _, name in places]  # paths and points have none
+    if sum(faces) > MOST_TRIANGLES:  # one mesh may stand in many places
+        raise InputError(f"it holds {sum(faces):,} triangles; a world has up to {MOST_TRIANGLES:,}")
     meshes = []
-    for node in sorted(scene.graph.nodes_geometry):
-        transform, name = scene.graph[node]
+    for transform, name in (place for place, count in zip(places, faces, strict=True) if count):
         mesh = scene.geometry[name].copy()
         mesh.apply_transform(transform)
         meshes.append(mesh)

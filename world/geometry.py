@@ -18,6 +18,10 @@ from jaxtyping import Float
 
 from .errors import InputError
 
+FARTHEST = (
+    1e7  # m from 0, in each coordinate: beyond, float32 corners are metres apart, and squares of squares may overflow
+)
+
 
 def wrap_angle(angle):
     """Wrap an angle, or an array of them, to [-pi, pi)."""
@@ -80,7 +84,7 @@ class Bounds(NamedTuple):
 class Route:
     """A path over the ground with a heading at each of its points.
 
-    poses: (n, 3) x [m], y [m], heading [rad]; n >= 2, finite, consecutive points apart.
+    poses: (n, 3) x [m], y [m], heading [rad]; n >= 2, within FARTHEST, consecutive points apart.
     """
 
     poses: Float[np.ndarray, "n 3"]
@@ -89,9 +93,12 @@ class Route:
         poses = np.array(self.poses, dtype=np.float64)
         if poses.ndim != 2 or poses.shape[1] != 3:
             raise InputError(f"a route needs points (x, y, heading), got an array of shape {poses.shape}")
-        if not np.isfinite(poses).all():
-            row = int(np.flatnonzero(~np.isfinite(poses).all(axis=1))[0])
-            raise InputError(f"route point {row + 1} is {poses[row].tolist()}; a route needs finite numbers")
+        near = np.abs(poses) <= FARTHEST  # False for nan, too
+        if not near.all():
+            row = int(near.all(axis=1).argmin())
+            raise InputError(
+                f"route point {row + 1} is {poses[row].tolist()}; a route needs finite numbers up to {FARTHEST:g}"
+            )
         keep = np.r_[True, np.hypot(*np.diff(poses[:, :2], axis=0).T) > 1e-9]  # m
         poses = poses[keep]
         if len(poses) < 2:
@@ -105,7 +112,8 @@ class Route:
         xy = np.asarray(xy, dtype=np.float64)
         if xy.ndim != 2 or xy.shape[1] != 2 or len(xy) < 2:
             raise InputError(f"a route needs at least 2 points (x, y), got an array of shape {xy.shape}")
-        steps = np.diff(xy, axis=0)
+        with np.errstate(all="ignore"):  # the route refuses what is not finite
+            steps = np.diff(xy, axis=0)
         heading = np.arctan2(steps[:, 1], steps[:, 0])
         return cls(np.column_stack([xy, np.r_[heading, heading[-1]]]))
 

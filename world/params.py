@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .errors import InputError
-from .scene import RGB
+from .scene import RGB, check_colour
 from .spelling import read_parameters, split_words
 
 
@@ -82,8 +82,8 @@ class WorldParams:
             value = getattr(self, item.name)
             if item.metadata:
                 object.__setattr__(self, item.name, _checked(item, value))
-            elif not _is_colour(value):
-                raise InputError(f"{item.name} is {value!r}; a colour is three whole numbers 0..255")
+            else:
+                check_colour(item.name, value)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "WorldParams":
@@ -120,10 +120,6 @@ def _checked(item: dataclasses.Field, value) -> float | int:
     if isinstance(value, bool) or not isinstance(value, kind | int) or not low <= value <= high:
         raise InputError(f"{item.name} is {value!r}; give {wanted} in {low:g}..{high:g} ({unit})")
     return kind(value)
-
-
-def _is_colour(value) -> bool:
-    return isinstance(value, tuple) and len(value) == 3 and all(isinstance(c, int) and 0 <= c <= 255 for c in value)
 
 
 PRESETS: dict[str, WorldParams] = {

@@ -8,12 +8,28 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from .errors import InputError
-from .geometry import Bounds
+from .geometry import FARTHEST, Bounds
 
 if TYPE_CHECKING:
     from .params import WorldParams
 
 RGB = tuple[int, int, int]
+
+
+def check_colour(name: str, value: Any) -> None:
+    """Refuse what is no colour. Raises InputError."""
+    whole = isinstance(value, tuple) and len(value) == 3 and all(isinstance(c, int) and 0 <= c <= 255 for c in value)
+    if not whole:
+        raise InputError(f"{name} is {value!r}; a colour is three whole numbers 0..255")
+
+
+def check_bounds(name: str, bounds: Any) -> None:
+    """Refuse what is no rectangle of places within FARTHEST. Raises InputError."""
+    whole = isinstance(bounds, Bounds) and all(
+        isinstance(b, int | float) and not isinstance(b, bool) and abs(b) <= FARTHEST for b in bounds
+    )
+    if not (whole and bounds.x_min <= bounds.x_max and bounds.y_min <= bounds.y_max):
+        raise InputError(f"{name} is {tuple(bounds)!r}; give x and y of its lower left and upper right corner (m)")
 
 
 @dataclass(frozen=True)
@@ -54,9 +70,17 @@ class World:
             if array.shape != shape or array.dtype != kind:
                 raise InputError(f"{name} of a world are {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
             object.__setattr__(self, name, array.copy())
-        if not np.isfinite(self.triangles).all():
-            bad = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
-            raise InputError(f"triangle {bad} of the world has a corner that is not finite; repair the mesh")
+        near = np.abs(self.triangles) <= FARTHEST  # False for nan, too
+        if not near.all():
+            bad = int(near.all(axis=(1, 2)).argmin())
+            raise InputError(
+                f"triangle {bad} of the world has a corner that is not finite, or over {FARTHEST:g} m away; repair the mesh"
+            )
+        check_colour("the sky's colour", self.sky_rgb)
+        check_bounds("the field", self.field)
+        if self.ground is not None:
+            check_colour("the ground's colour", self.ground.rgb)
+            check_bounds("the ground", self.ground.bounds)
         self.triangles.flags.writeable = False
         self.rgb.flags.writeable = False
 

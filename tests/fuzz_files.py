@@ -1,0 +1,147 @@
+"""Files that people open: whatever is in them, they are read, or refused in one line that names them."""
+
+import json
+import struct
+
+import numpy as np
+import trimesh
+from fuzzing import FOLDER, answer, damaged, damaged_json, holds, main
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from render import Eye, open_renderer
+from world.files import read_route, read_world, write_world
+from world.scene import World
+
+
+def whole_worlds() -> dict[str, list[bytes]]:
+    """Files of worlds by their endings."""
+    world = World.generate("tiny", 0)
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.new("RGB", (4, 4), (9, 200, 30)))
+    square = trimesh.Trimesh(
+        np.column_stack([corners, np.ones(4)]), [[0, 1, 2], [0, 2, 3]], process=False,
+        visual=trimesh.visual.TextureVisuals(uv=corners, material=material),
+    )  # fmt: skip
+    box = trimesh.creation.box()
+    for suffix in ("glb", "ply"):
+        write_world(world, FOLDER / f"whole.{suffix}")
+    antworld = np.concatenate(
+        [world.triangles[:9].reshape(9, 9)[:, [0, 3, 6, 1, 4, 7, 2, 5, 8]].T, world.rgb[:9].T / 255]
+    )
+    return {
+        "glb": [(FOLDER / "whole.glb").read_bytes(), bytes(trimesh.Scene([square, box]).export(file_type="glb"))],
+        "ply": [
+            (FOLDER / "whole.ply").read_bytes(),
+            box.export(file_type="ply"),
+            box.export(file_type="ply", encoding="ascii"),
+        ],
+        "obj": [square.export(file_type="obj").encode(), box.export(file_type="obj").encode()],
+        "stl": [box.export(file_type="stl"), box.export(file_type="stl_ascii").encode()],
+        "bin": [antworld.astype("<f8").tobytes()],
+        "off": [box.export(file_type="off").encode()],
+    }
+
+
+WORLDS = whole_worlds()
+EYE = Eye(width=8, height=3, samples=1)
+
+
+def drawn(path) -> None:
+    """Read a world and draw it, or see it refused."""
+    world = answer(path, lambda: read_world(path))
+    if world is None:
+        return
+    renderer = answer(None, lambda: open_renderer(world, EYE, "cpu"))
+    if renderer is not None:
+        with renderer:
+            x, y = (world.field.x_min + world.field.x_max) / 2, (world.field.y_min + world.field.y_max) / 2
+            answer(None, lambda: renderer.render([(x, y, 0.0), (0.0, 0.0, 1.0)]))
+    again = path.with_name("again.glb")
+    answer(again, lambda: write_world(world, again))
+
+
+@holds(300)
+@given(
+    st.sampled_from(list(WORLDS)).flatmap(
+        lambda kind: st.tuples(st.just(kind), damaged(WORLDS[kind]) | st.binary(max_size=200))
+    )
+)
+def world_files(file):
+    kind, data = file
+    path = FOLDER / f"world.{kind}"
+    path.write_bytes(data)
+    drawn(path)
+
+
+def glb_of(tree, rest: bytes) -> bytes:
+    """A GLB of a JSON chunk and what follows it."""
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
+
+
+def glb_parts(data: bytes):
+    """The JSON chunk of a GLB, and what follows it."""
+    length = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20 : 20 + length]), data[20 + length :]
+
+
+GLBS = [glb_parts(data) for data in WORLDS["glb"]]
+COMMENT = json.loads(WORLDS["ply"][0].partition(b"comment tussock ")[2].partition(b"\n")[0])
+
+
+@holds(300)
+@given(st.sampled_from(GLBS).flatmap(lambda parts: st.tuples(damaged_json(parts[0]), st.just(parts[1]))))
+def world_trees(parts):
+    path = FOLDER / "tree.glb"
+    path.write_bytes(glb_of(*parts))
+    drawn(path)
+
+
+@holds(200)
+@given(damaged_json(COMMENT), st.sampled_from(["glb", "ply"]))
+def world_metadata(comment, kind):
+    path = FOLDER / f"metadata.{kind}"
+    if kind == "ply":
+        head, _, rest = WORLDS["ply"][0].partition(b"comment tussock ")
+        path.write_bytes(head + b"comment tussock " + json.dumps(comment).encode() + b"\n" + rest.partition(b"\n")[2])
+    else:
+        tree, rest = glb_parts(WORLDS["glb"][0])
+        tree["scenes"][0]["extras"]["tussock"] = comment
+        path.write_bytes(glb_of(tree, rest))
+    drawn(path)
+
+
+ROUTES = [
+    b"x_m,y_m,heading_deg\n0.5,0.5,0\n1,1,45\n2,1.5,-90\n",
+    b'x_m, y_m\r\n"0.5",0.5\r\n1,1\r\n2,1.5\r\n',
+    "﻿x_m,y_m,heading_deg,é\n0,0,0,x\n1,0,0,y\n".encode(),
+    np.array([[0, 100, 200], [0, 50, 70], [0, 10, 20]], dtype="<f8").tobytes(),
+]
+odd_numbers = st.floats() | st.sampled_from([1e300, -1e300, 1e154, 1e18, 5e-324, -0.0])
+rows = st.lists(st.tuples(odd_numbers, odd_numbers, odd_numbers), min_size=2, max_size=5)
+
+
+@holds(300)
+@given(
+    damaged(ROUTES) | st.binary(max_size=100) | st.text(max_size=60).map(lambda text: text.encode("utf-8", "surrogatepass"))
+    | rows.map(lambda rows: ("x_m,y_m,heading_deg\n" + "\n".join(",".join(map(repr, row)) for row in rows)).encode())
+    | rows.map(lambda rows: np.array(rows, dtype="<f8").T.tobytes()),
+    st.sampled_from(["csv", "bin"]),
+)  # fmt: skip
+def routes(data, kind):
+    path = FOLDER / f"route.{kind}"
+    path.write_bytes(data)
+    route = answer(path, lambda: read_route(path))
+    if route is not None:
+        assert np.isfinite(route.poses).all()
+        assert np.isfinite(route.length)
+        assert np.isfinite(route.at([0.0, route.length / 3, np.inf])).all()
+        assert np.isfinite(route.nearest(np.array([[0.0, 0.0]]))[0]).all()
+        answer(None, lambda: route.resampled(route.length / 7))
+
+
+if __name__ == "__main__":
+    main()
