@@ -15,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
+from PIL import Image
 
 from world.errors import InputError
 from world.files import replacing
@@ -33,6 +34,8 @@ from .database_files import (
 )
 
 KINDS = ("route", "grid")
+FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
+MOST_PIXELS = 10**8  # of an image: no eye draws more, and a small file can say that it holds any number
 X, Y, Z, HEADING = "X [mm]", "Y [mm]", "Z [mm]", "Heading [degrees]"
 
 
@@ -131,13 +134,18 @@ def understood(
     for name in (X, Y, "Filename"):
         if name not in columns:
             raise InputError(f"{path}, line 1: there is no column {name!r}; a database has {X}, {Y} and Filename")
+    for name, line in zip(columns["Filename"], lines, strict=True):
+        if "\0" in name or len(name.splitlines()) > 1:
+            raise InputError(f"{path}, line {line}: {name!r} is no file's name; give it one without line breaks")
     x, y, z, bearing = (numbers(path, columns, name, lines) for name in (X, Y, Z, HEADING))
     poses = poses_of(np.rint(np.column_stack([x * 1e6, y * 1e6, bearing * 1e9])))
     return tuple(name or None for name in columns["Filename"]), poses, z / 1e3
 
 
 def leaves(folder: Path, name: str) -> bool:
-    """Whether a file name leads out of a folder: absolute, through `..`, or through a link."""
+    """Whether a file name leads out of a folder, or a copy of it: absolute, through `..`, or through a link."""
+    if Path(name).is_absolute() or ".." in Path(name).parts:
+        return True
     try:
         return not (folder / name).resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):  # names too long, with a NUL; links in a circle
@@ -149,9 +157,16 @@ def read_image(path: Path) -> UInt8[np.ndarray, "height width channels"]:
     if not os.path.isfile(path):  # False for names too long, too
         raise InputError(f"there is no image {path}; tussock database check lists what is missing")
     try:
+        with Image.open(path, formats=FORMATS) as header:  # which reads no more than that
+            size = header.size
+    except Exception as error:  # Pillow's readers raise whatever their parsers do
+        raise InputError(f"{path} cannot be read as an image of 8 bits; is it complete?") from error
+    if size[0] * size[1] > MOST_PIXELS:
+        raise InputError(f"{path} says that it is {size[0]} x {size[1]}; images have up to {MOST_PIXELS:,} pixels")
+    try:
         data = path.read_bytes()
         # libpng complains to standard error of what does not end as it should.
-        whole = len(data) > 0 and (data[1:4] != b"PNG" or b"IEND" in data[-12:])
+        whole = data[1:4] != b"PNG" or b"IEND" in data[-12:]
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if whole else None
     except (cv2.error, OSError):
         image = None

@@ -1,6 +1,7 @@
 """The two text files of an image database, and the units in them: entries (CSV) and metadata (YAML of OpenCV's kind)."""
 
 import csv
+import os
 import re
 from contextlib import suppress
 from pathlib import Path
@@ -20,6 +21,7 @@ METADATA = "database_metadata.yaml"
 
 LARGEST = 1e9  # of a number in a file; within it nanometres are whole float64 numbers
 FULL_TURN = 360e9  # in billionths of a degree
+MOST_COLUMNS = 1000  # every row has a cell in each, however short its line
 DEEPEST = 1000  # levels of nesting, at the most; OpenCV's parser overflows its stack somewhere above 10,000
 PLAIN = re.compile(r"[A-Za-z_]([A-Za-z0-9_ -]*[A-Za-z0-9_])?")  # text that YAML takes for text without quotes ..
 NOT_TEXT = ("true", "false", "null", "nan", "inf", "yes", "no", "on", "off", "y", "n")  # .. but for these
@@ -41,7 +43,7 @@ def read_entries(path: Path) -> tuple[Columns, list[int]]:
 
     Cells are stripped; those missing at a row's end are empty. Raises InputError naming the line that cannot be used.
     """
-    if not path.is_file():
+    if not os.path.isfile(path):  # False for names too long, too
         raise InputError(f"there is no {path}; an image database is a folder with {ENTRIES} and {METADATA}")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -68,6 +70,8 @@ def _header(cells: list[str], path: Path) -> list[str]:
     header = [name.strip() for name in cells]
     while header and not header[-1]:  # a comma at the line's end
         header.pop()
+    if len(header) > MOST_COLUMNS:
+        raise InputError(f"{path}, line 1: {len(header)} columns; a database has up to {MOST_COLUMNS}")
     twice = [name for name in header if header.count(name) > 1]
     if twice:
         raise InputError(f"{path}, line 1: the column {twice[0]!r} stands twice; rename one")
@@ -132,7 +136,7 @@ def read_metadata(path: Path) -> dict[str, Any]:
 
     Raises InputError where it is missing or damaged, with the line if known.
     """
-    if not path.is_file():
+    if not os.path.isfile(path):  # False for names too long, too
         raise InputError(f"there is no {path}; an image database is a folder with {ENTRIES} and {METADATA}")
     try:
         return _parse(path.read_text(encoding="utf-8-sig"))

@@ -15,7 +15,7 @@ from jaxtyping import Float, UInt8
 
 from world.errors import InputError
 from world.files import replacing
-from world.geometry import Bounds
+from world.geometry import FARTHEST, Bounds
 
 from .database import HEADING, Database, X, Y, Z, read_database
 from .database_files import (
@@ -35,6 +35,7 @@ from .renderer import Poses, Renderer
 
 BATCH = 64  # views rendered while those before are encoded
 MOST_VIEWS = 10**6  # of a grid
+FINEST = 0.001  # m between the views of a grid: names hold whole millimetres
 
 
 def published_part(field: Bounds) -> Bounds:
@@ -56,6 +57,10 @@ class Grid:
     @classmethod
     def over(cls, bounds: Bounds, spacing: float) -> "Grid":
         """The multiples of `spacing` (m) inside bounds, borders included. Raises InputError where there are none, or over a million."""
+        if not (FINEST <= spacing <= FARTHEST and (np.abs(bounds) <= FARTHEST).all()):
+            raise InputError(
+                f"a grid of {spacing:g} m over {bounds}; give a spacing from {FINEST:g} up, and finite metres"
+            )
         # A billionth of a spacing beyond the borders: 0.6 / 0.2 is not quite 3.
         low = np.ceil(np.array(bounds[:2]) / spacing - 1e-9).astype(int)
         across, up = (np.floor(np.array(bounds[2:]) / spacing + 1e-9).astype(int) - low + 1).tolist()

@@ -11,7 +11,7 @@ HERE = Path(__file__).parent
 GENEROUS = 600  # seconds; only what hangs takes so long
 
 
-@pytest.mark.parametrize("file", ["fuzz_files"])
+@pytest.mark.parametrize("file", ["fuzz_files", "fuzz_databases"])
 def test_anything_is_used_or_refused(file):
     paths = os.pathsep.join([str(HERE.parent), str(HERE), os.environ.get("PYTHONPATH", "")])
     run = subprocess.run(

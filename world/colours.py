@@ -5,6 +5,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
+from .errors import InputError
+from .geometry import FARTHEST
+
 
 def texture_of(mesh) -> Any:
     """The image a mesh is textured with, or None."""
@@ -25,9 +28,11 @@ def texture_factor(mesh) -> Float[np.ndarray, "3"]:
 
 
 def face_rgb(mesh) -> UInt8[np.ndarray, "n 3"]:
-    """One colour a triangle: its own, the mean of its corners', or the mean of its texture over it."""
+    """One colour a triangle: its own, the mean of its corners', or the mean of its texture over it. Raises InputError for one whose places are not finite."""
     image = texture_of(mesh)
     if image is not None:
+        if not (np.abs(mesh.visual.uv) <= FARTHEST).all():
+            raise InputError(f"a place in a texture is not finite, or over {FARTHEST:g}; repair the mesh")
         mean = _mean_of_texture(np.asarray(image.convert("RGB")), mesh.visual.uv[mesh.faces].astype(np.float32))
         return np.rint(mean * texture_factor(mesh)).astype(np.uint8)
     if mesh.visual.kind == "texture":

@@ -23,12 +23,10 @@ def check_colour(name: str, value: Any) -> None:
         raise InputError(f"{name} is {value!r}; a colour is three whole numbers 0..255")
 
 
-def check_bounds(name: str, bounds: Any) -> None:
+def check_bounds(name: str, bounds: Bounds) -> None:
     """Refuse what is no rectangle of places within FARTHEST. Raises InputError."""
-    whole = isinstance(bounds, Bounds) and all(
-        isinstance(b, int | float) and not isinstance(b, bool) and abs(b) <= FARTHEST for b in bounds
-    )
-    if not (whole and bounds.x_min <= bounds.x_max and bounds.y_min <= bounds.y_max):
+    numbers = all(isinstance(b, int | float) and not isinstance(b, bool) and abs(b) <= FARTHEST for b in bounds)
+    if not (numbers and bounds[0] <= bounds[2] and bounds[1] <= bounds[3]):
         raise InputError(f"{name} is {tuple(bounds)!r}; give x and y of its lower left and upper right corner (m)")
 
 
