@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from numbers import Integral, Real
-from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
+from typing import Any, ClassVar, Protocol, TypeVar, get_origin, runtime_checkable
 
 import numpy as np
 import torch
@@ -17,6 +17,11 @@ from world.errors import InputError
 from world.spelling import spell
 
 from .rotation import in_parts
+
+WIDEST = 8192  # columns of a view: the engine's matrices have half as many rows, and a column each
+NARROWEST = 4  # as of an eye
+LARGEST = 1e12  # number in a view, or learned: sums of squares over whole views stay far from float32's largest
+WHOLE = ("index", "wiring")  # what is learned as whole numbers; labels are of their own type, and all else is float32
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]
@@ -105,7 +110,7 @@ class Model(ABC):
         return spell(self.name, self.parameters, type(self))
 
     def fit(self: Self, views: Images) -> Self:
-        """Learn the views, forgetting earlier ones. Raises InputError for no views and for values that are not finite."""
+        """Learn the views, forgetting earlier ones. Raises InputError for no views and for values beyond LARGEST."""
         self.check_parameters()
         check_device(self.device)
         check_training(views)
@@ -118,7 +123,12 @@ class Model(ABC):
         check_scan(views, self.shape)
         if len(views) == 0:
             return torch.empty(0, views.shape[2])
-        return torch.cat([self._scan(self._here(part)) for part in in_parts(views)])
+        scans = torch.cat([self._scan(self._here(part)) for part in in_parts(views)])
+        if not torch.isfinite(scans).all():
+            raise InputError(
+                f"{self.name}: familiarity is beyond float32 (has its training come to large weights?); scale the views"
+            )
+        return scans
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
         """Take over what was learned, from training or from a file; where that fails, it knows what it knew.
@@ -140,6 +150,8 @@ class Model(ABC):
         for each in dataclasses.fields(self):
             value = getattr(self, each.name)
             if each.init and each.name != "device" and not (value is None and each.default is None):
+                if get_origin(each.type) is tuple and not isinstance(value, (tuple, list)):
+                    raise InputError(f"{self.name}: {each.name} {value!r}; give several, as {each.default!r}")
                 self._check_parameter(each.name, value, each.default)
 
     def _check_parameter(self, name: str, value: Any, default: Any) -> None:
@@ -182,18 +194,23 @@ class Model(ABC):
 
     def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
         """Raise InputError where a model with these parameters cannot have learned this from views of `shape`."""
+        if shape[1] > WIDEST:
+            raise InputError(f"{self.name}: views of {shape[1]} columns; give at most {WIDEST} (--resize)")
         expected = self._shapes(*shape)
         if learned.keys() != expected.keys():
             raise InputError(f"{self.name}: it learns {', '.join(expected)}, not {', '.join(learned) or 'nothing'}")
         for key, tensor in learned.items():
             fits = len(tensor.shape) == len(expected[key]) and all(
-                want in (None, size) for want, size in zip(expected[key], tensor.shape, strict=True)
+                want in (None, size) and size > 0 for want, size in zip(expected[key], tensor.shape, strict=True)
             )
             if not fits:
                 raise InputError(f"{self.name}: {key} of shape {tuple(tensor.shape)}, not {expected[key]}")
-            if not all_finite(tensor):
+            kind, name = tensor.dtype, key.rpartition(".")[2]
+            if kind != (torch.int64 if name in WHOLE else torch.float32) and name != "classes":
+                raise InputError(f"{self.name}: {key} of type {kind}, which it does not learn")
+            if not all_bounded(tensor):
                 raise InputError(
-                    f"{self.name}: the {key} are not finite; if they grew without bound, give a lower rate"
+                    f"{self.name}: the {key} are not finite, or over {LARGEST:g}; if they grew without bound, give a lower rate"
                 )
 
     def _random(self) -> torch.Generator:
@@ -253,7 +270,11 @@ def check_training(views: Images) -> None:
     """Refuse views that no model can learn. Raises InputError."""
     if views.ndim != 3 or len(views) == 0:
         raise InputError(f"a model learns from at least one view (n, h, w), got shape {tuple(views.shape)}")
-    check_finite(views)
+    if views.shape[1] < 1 or not NARROWEST <= views.shape[2] <= WIDEST:
+        raise InputError(
+            f"views of {views.shape[2]} x {views.shape[1]} pixels; give {NARROWEST} to {WIDEST} columns (--resize) and at least a row"
+        )
+    check_numbers(views)
 
 
 def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
@@ -264,16 +285,21 @@ def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
         raise InputError(
             f"this model learned views of shape {tuple(shape)}, got {tuple(views.shape[1:])}; encode both alike"
         )
-    check_finite(views)
+    check_numbers(views)
 
 
-def check_finite(views: Images) -> None:
-    """Refuse NaN and infinity. Raises InputError."""
-    if not all_finite(views):
-        bad = int(torch.nonzero(~torch.isfinite(views).flatten(start_dim=1).all(dim=1))[0, 0])
-        raise InputError(f"view {bad} holds numbers that are not finite; check the encoding")
+def check_numbers(views: Images) -> None:
+    """Refuse what is not float32, NaN, infinity and what is beyond LARGEST. Raises InputError."""
+    if views.dtype != torch.float32:
+        raise InputError(f"views are float32, got {views.dtype}; give views.float()")
+    if not all_bounded(views):
+        bad = int((views.abs() <= LARGEST).flatten(start_dim=1).all(dim=1).int().argmin())
+        raise InputError(f"view {bad} holds numbers that are not finite, or over {LARGEST:g}; check the encoding")
 
 
-def all_finite(tensor: torch.Tensor) -> bool:
-    """Whether all numbers are finite. Their sum says so quickly, but it can overflow."""
-    return math.isfinite(tensor.sum()) or bool(torch.isfinite(tensor).all())
+def all_bounded(tensor: torch.Tensor) -> bool:
+    """Whether all numbers lie within LARGEST, which NaN does not."""
+    if tensor.numel() == 0:
+        return True
+    least, greatest = tensor.aminmax()
+    return -LARGEST <= float(least) and float(greatest) <= LARGEST

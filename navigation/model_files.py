@@ -44,9 +44,8 @@ def save_model(
     if model.shape is None:
         raise InputError(f"{path}: this model has learned nothing yet; fit it before it is saved")
     model.check_learned(model.shape, model.learned)
-    snapshots = model.learned.get("snapshots")
-    if poses is not None and snapshots is not None and len(poses) != len(snapshots):
-        raise InputError(f"{path}: {len(poses)} poses for {len(snapshots)} snapshots; give the pose of each, or none")
+    if poses is not None:
+        check_poses(path, model, poses)
     device_free = {key: value for key, value in model.parameters.items() if key != "device"}
     header = {
         "version": VERSION, "model": model.name, "parameters": device_free, "shape": model.shape,
@@ -59,6 +58,17 @@ def save_model(
         partial.write_bytes(save(tensors, {HEADER: json.dumps(header, default=lambda number: number.item())}))
 
 
+def check_poses(path: str | os.PathLike, model: Model, poses: np.ndarray) -> None:
+    """Refuse poses that are not those of the views a trained model learned. Raises InputError."""
+    if not (poses.ndim == 2 and poses.shape[1] == 3 and np.isfinite(poses).all()):
+        raise InputError(f"{path}: its poses are not (n, 3) finite numbers; train it anew")
+    snapshots, last = model.learned.get("snapshots"), model.learned.get("index")  # which matches are looked up by
+    if snapshots is not None and len(poses) != len(snapshots):
+        raise InputError(f"{path}: {len(poses)} poses for {len(snapshots)} snapshots; give the pose of each, or none")
+    if last is not None and len(poses) <= int(last):
+        raise InputError(f"{path}: {len(poses)} poses, and it knows view {int(last)}; give the pose of each, or none")
+
+
 def first_line(error: Exception) -> str:
     """What an exception says, without the lines that only programmers read."""
     return (str(error).splitlines() or [type(error).__name__])[0]
@@ -67,7 +77,7 @@ def first_line(error: Exception) -> str:
 def load_model(path: str | os.PathLike, *, expect: str | None = None, device: str = "cpu") -> SavedModel:
     """Read a trained model. Raises InputError for what is no such file, is damaged, or holds another model than `expect`."""
     path = Path(path)
-    if not path.is_file():
+    if not os.path.isfile(path):  # False for names too long, too
         raise InputError(f"there is no model file {path}")
     try:
         with safetensors.safe_open(path, framework="pt") as file:
@@ -101,10 +111,11 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
             raise ValueError("its numbers make no scan")
         encoding = None if header["encoding"] is None else Encoding.parse(header["encoding"])
         eye = None if header["eye"] is None else Eye(**header["eye"])
-        if poses is not None and not (
-            poses.ndim == 2 and poses.shape[1] == 3 and poses.is_floating_point() and poses.isfinite().all()
-        ):
-            raise ValueError("its poses are not (n, 3) finite numbers")
+        if poses is not None and not poses.is_floating_point():
+            raise ValueError(f"its poses are {poses.dtype}")
+        where = None if poses is None else poses.double().numpy()
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError) as error:
         raise InputError(f"{path} is damaged, or of another version ({first_line(error)}); train it anew") from error
-    return SavedModel(model=model, encoding=encoding, eye=eye, poses=None if poses is None else poses.double().numpy())
+    if where is not None:
+        check_poses(path, model, where)
+    return SavedModel(model=model, encoding=encoding, eye=eye, poses=where)

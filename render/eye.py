@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from world.errors import InputError
+from world.geometry import FARTHEST
 
 MOST_RAYS = 10**8  # 1.2 GB a thread to draw with
 
@@ -29,6 +30,14 @@ class Eye:
     samples: int | None = None
 
     def __post_init__(self):
+        for name in ("width", "height", "samples"):
+            value = getattr(self, name)
+            if not isinstance(value, int | np.integer) and not (name == "samples" and value is None):
+                raise InputError(f"the eye's {name} is {value!r}; give a whole number")
+        for name in ("top", "bottom", "z"):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float | np.number) and abs(value) <= FARTHEST):
+                raise InputError(f"the eye's {name} is {value!r}; give a finite number")
         if self.width < 4 or self.height < 1:
             raise InputError(f"a view of {self.width} x {self.height} pixels cannot be drawn; give at least 4 x 1")
         if self.width > 32768 or self.height > 16384:
@@ -37,8 +46,6 @@ class Eye:
             raise InputError(
                 f"elevations {np.degrees(self.bottom):g}..{np.degrees(self.top):g} degrees: give -90 <= bottom < top <= 90"
             )
-        if not np.isfinite(self.z):
-            raise InputError(f"eye height {self.z} m; give a finite height")
         if self.samples is not None and not 1 <= self.samples <= 64:
             raise InputError(f"{self.samples} samples a pixel side; give 1 to 64")
         if self.width * self.height * self.rays**2 > MOST_RAYS:

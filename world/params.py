@@ -88,8 +88,10 @@ class WorldParams:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "WorldParams":
         """Parameters from plain JSON types, as `World.origin["params"]` has them; missing ones take their defaults."""
+        if not isinstance(values, dict):
+            raise InputError(f"parameters of a world are names and values, got {values!r}")
         names = {item.name for item in dataclasses.fields(cls)}
-        if unknown := sorted(set(values) - names):
+        if unknown := sorted(set(map(str, values)) - names):
             raise InputError(f"{unknown[0]!r} is no parameter of a world; there are {', '.join(sorted(names))}")
         plain: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
         return cls(**plain)

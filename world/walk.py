@@ -25,6 +25,7 @@ PREFERRED = 0.12  # m; tighter than this costs more than twice the way
 SPACING = 0.01  # m between points of a route
 SHARPEST = np.radians(30)  # within 2 cm
 TRIES = 60
+MOST_CELLS = 4 * 10**7  # of the grid: a field of 126 m x 126 m
 
 
 def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
@@ -59,6 +60,10 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     sides = np.array([field.x_max - field.x_min, field.y_max - field.y_min])
     length = min(float(length), 0.8 * float(np.hypot(*sides)))
     margin = min(0.3, 0.05 * float(sides.min()))
+    if np.prod(sides / CELL) > MOST_CELLS:
+        raise InputError(
+            f"the field ({field}) is too large to look for a route in, {MOST_CELLS * CELL**2:,.0f} m2 at most; give a route"
+        )
     inside = Bounds(field.x_min + margin, field.y_min + margin, field.x_max - margin, field.y_max - margin)
     if goal is not None:
         _check_goal(world, goal, inside)
@@ -155,6 +160,8 @@ def _graph(room: Float[np.ndarray, "rows columns"], inside: Bounds) -> tuple[Flo
 
 
 def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
+    if len(goal) != 2:
+        raise InputError(f"a goal at {goal!r}; give x and y (m)")
     x, y = goal
     if not (np.isfinite(goal).all() and inside.contains(x, y)):
         raise InputError(f"a goal at ({x:g}, {y:g}) m; choose one inside the field, off its edge ({inside})")

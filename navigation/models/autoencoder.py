@@ -22,6 +22,7 @@ class Autoencoder(Model):
     name = "autoencoder"
     paper = "Vincent et al. 2008; Philippides et al. 2015"
 
+    LIMITS = {"units": (1, 10_000)}  # noqa: RUF012 (the units' overlaps are its square)
     units: int = 100
     epochs: int = 50
     rate: float = 1e-3

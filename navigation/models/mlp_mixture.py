@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import torch
 from jaxtyping import Int64
 
-from ..familiarity import Images, Scans
+from world.errors import InputError
+
+from ..familiarity import Images, Learned, Scans
 from .mlp_rotation import MLPRotation
 
 
@@ -23,8 +25,15 @@ class MLPMixture(MLPRotation):
     name = "mlp-mixture"
     paper = "the thesis, future work; Jacobs et al. 1991"
 
+    LIMITS = MLPRotation.LIMITS | {"stretches": (1, 200)}  # noqa: RUF012 (the readout is all units times all stretches)
     stretches: int = 8
     units: int = 20
+
+    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
+        """As for all models; and there are no more networks than stretches."""
+        super().check_learned(shape, learned)
+        if len(learned["output"]) > self.stretches:
+            raise InputError(f"{self.name}: {len(learned['output'])} networks for {self.stretches} stretches")
 
     def stretch_of(self, views: Images) -> Int64[torch.Tensor, " n"]:
         """Stretch of each training view, so that successive views change by the same sum in each."""

@@ -9,6 +9,8 @@ import torch
 from jaxtyping import Float32, Int64
 from torch.nn.functional import log_softmax, pad, relu
 
+from world.errors import InputError
+
 from ..familiarity import Images, Learned, Model, Scans
 from ..rotation import FilterBank, all_rotations, bell
 
@@ -71,6 +73,13 @@ class MLPRotation(Model):
             optimiser.step()
             schedule.step()
         return {"weights": weights.detach(), "biases": biases.detach(), "output": output.detach()}
+
+    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
+        """As for all models; and each network has its units."""
+        super().check_learned(shape, learned)
+        units = learned["output"].numel()
+        if not len(learned["weights"]) == len(learned["biases"]) == units:
+            raise InputError(f"{self.name}: {len(learned['weights'])} weights for {units} units")
 
     def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
         return {"weights": (None, height, width), "biases": (None,), "output": (None, self.units)}

@@ -12,6 +12,8 @@ from world.errors import InputError
 from ..familiarity import Images, IncrementalModel, Learned, Scans
 from ..rotation import FilterBank, smoothed
 
+MOST_SHARES = 2**28  # of pixels in fields: 1 GB
+
 
 @dataclass(kw_only=True, eq=False)
 class MushroomBody(IncrementalModel):
@@ -49,7 +51,7 @@ class MushroomBody(IncrementalModel):
 
     def _add(self, learned: Learned, views: Images) -> Learned:
         synapses = learned["synapses"].clone()
-        fields = FilterBank(receptive_fields(self.columns, self.rows, *views.shape[1:]).to(self.device))
+        fields = self._bank(*views.shape[1:])
         for view in views:
             (firing,) = self._firing(self._projection(fields, view)[:, :1], learned["wiring"])
             synapses[firing] *= 1 - self.depression
@@ -68,7 +70,16 @@ class MushroomBody(IncrementalModel):
 
     def _prepare(self) -> None:
         assert self.shape is not None
-        self._fields = FilterBank(receptive_fields(self.columns, self.rows, *self.shape).to(self.device))
+        self._fields = self._bank(*self.shape)
+
+    def _bank(self, height: int, width: int) -> FilterBank:
+        """The fields of the projection neurons, for views of height x width."""
+        if self.columns * self.rows * height * width > MOST_SHARES:
+            raise InputError(
+                f"{self.name}: {self.columns} x {self.rows} fields of {width} x {height} pixels are over {MOST_SHARES:,} numbers; "
+                "give fewer, or smaller views (--resize)"
+            )
+        return FilterBank(receptive_fields(self.columns, self.rows, height, width).to(self.device))
 
     def _scan(self, views: Images) -> Scans:
         scans = []

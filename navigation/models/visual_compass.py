@@ -3,6 +3,8 @@
 import torch
 from jaxtyping import Int64
 
+from world.errors import InputError
+
 from ..familiarity import Images, Learned, Model, Scans
 from .perfect_memory import PerfectMemory
 
@@ -26,6 +28,12 @@ class VisualCompass(Model):
 
     def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
         return {"snapshot": (1, height, width), "index": ()}
+
+    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
+        """As for all models; and the view has a place among those it was given."""
+        super().check_learned(shape, learned)
+        if learned["index"] < 0:
+            raise InputError(f"{self.name}: its view is number {int(learned['index'])}, which is none")
 
     def _prepare(self) -> None:
         self._memory = PerfectMemory(device=self.device).fit(self.learned["snapshot"])
