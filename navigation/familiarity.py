@@ -302,4 +302,4 @@ def all_bounded(tensor: torch.Tensor) -> bool:
     if tensor.numel() == 0:
         return True
     least, greatest = tensor.aminmax()
-    return -LARGEST <= float(least) and float(greatest) <= LARGEST
+    return float(least) >= -LARGEST and float(greatest) <= LARGEST

@@ -35,7 +35,9 @@ from .database_files import (
 
 KINDS = ("route", "grid")
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
-MOST_PIXELS = 10**8  # of an image: no eye draws more, and a small file can say that it holds any number
+MOST_PIXELS = (
+    8 * 10**7
+)  # of an image: a small file can say that it holds any number. Pillow itself warns of over 89 million
 X, Y, Z, HEADING = "X [mm]", "Y [mm]", "Z [mm]", "Heading [degrees]"
 
 
@@ -159,6 +161,8 @@ def read_image(path: Path) -> UInt8[np.ndarray, "height width channels"]:
     try:
         with Image.open(path, formats=FORMATS) as header:  # which reads no more than that
             size = header.size
+    except Image.DecompressionBombError as error:
+        raise InputError(f"{path} is too large; images have up to {MOST_PIXELS:,} pixels") from error
     except Exception as error:  # Pillow's readers raise whatever their parsers do
         raise InputError(f"{path} cannot be read as an image of 8 bits; is it complete?") from error
     if size[0] * size[1] > MOST_PIXELS:

@@ -148,18 +148,25 @@ def names(examined: Examined) -> Iterator[Problem]:
 def headings(examined: Examined) -> Iterator[Problem]:
     """Headings of a route that do not lead along it."""
     poses = examined.database.poses
-    off = _off_path(poses, poses[:, 2])
-    judged = np.isfinite(off)
-    if examined.database.kind != "route" or not judged.any():
+    if examined.database.kind != "route":
         return
-    median, wrong = np.median(off[judged]), np.flatnonzero(off > OFF_PATH).tolist()
-    if median > CONVENTION:
-        what = f"headings are {np.degrees(median):.0f} degrees off the path (median)"
-        yield Problem("heading-convention", ENTRIES, what + _meant(poses))
+    off = _off_path(poses, poses[:, 2])
+    meant, wrong = other_convention(poses), np.flatnonzero(off > OFF_PATH).tolist()
+    if meant is not None:
+        yield Problem("heading-convention", ENTRIES, meant)
     elif len(wrong):
         degrees = np.degrees(off[wrong[0]])
         what = f"{len(wrong)} headings are over 60 degrees off the path, the first by {degrees:.0f}"
         yield Problem("heading-off-path", examined.line(wrong[0]), what)
+
+
+def other_convention(poses: Float[np.ndarray, "n 3"]) -> str | None:
+    """A sentence on how a route's headings do not lead along it, most of them, or None where they do, or nobody can tell."""
+    off = _off_path(poses, poses[:, 2])
+    judged = np.isfinite(off)
+    if not judged.any() or (median := np.median(off[judged])) <= CONVENTION:
+        return None
+    return f"headings are {np.degrees(median):.0f} degrees off the path (median){_meant(poses)}"
 
 
 def _off_path(poses: Float[np.ndarray, "n 3"], heading: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -62,7 +62,7 @@ def drawn(path) -> None:
     answer(again, lambda: write_world(world, again))
 
 
-@holds(300)
+@holds(120)
 @given(
     st.sampled_from(list(WORLDS)).flatmap(
         lambda kind: st.tuples(st.just(kind), damaged(WORLDS[kind]) | st.binary(max_size=200))
@@ -92,7 +92,7 @@ GLBS = [glb_parts(data) for data in WORLDS["glb"]]
 COMMENT = json.loads(WORLDS["ply"][0].partition(b"comment tussock ")[2].partition(b"\n")[0])
 
 
-@holds(300)
+@holds(120)
 @given(st.sampled_from(GLBS).flatmap(lambda parts: st.tuples(damaged_json(parts[0]), st.just(parts[1]))))
 def world_trees(parts):
     path = FOLDER / "tree.glb"
@@ -100,7 +100,7 @@ def world_trees(parts):
     drawn(path)
 
 
-@holds(200)
+@holds(80)
 @given(damaged_json(COMMENT), st.sampled_from(["glb", "ply"]))
 def world_metadata(comment, kind):
     path = FOLDER / f"metadata.{kind}"
@@ -124,7 +124,7 @@ odd_numbers = st.floats() | st.sampled_from([1e300, -1e300, 1e154, 1e18, 5e-324,
 rows = st.lists(st.tuples(odd_numbers, odd_numbers, odd_numbers), min_size=2, max_size=5)
 
 
-@holds(300)
+@holds(120)
 @given(
     damaged(ROUTES) | st.binary(max_size=100) | st.text(max_size=60).map(lambda text: text.encode("utf-8", "surrogatepass"))
     | rows.map(lambda rows: ("x_m,y_m,heading_deg\n" + "\n".join(",".join(map(repr, row)) for row in rows)).encode())

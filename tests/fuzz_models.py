@@ -1,13 +1,12 @@
 """Model files and what is given to models: used or refused; nothing is run, and no memory is taken for what a file does not hold."""
 
-import dataclasses
 import json
 import os
 import pickle
 
 import numpy as np
 import torch
-from fuzzing import FOLDER, VALUES, answer, damaged, damaged_json, holds, main
+from fuzzing import FOLDER, answer, damaged, damaged_json, holds, main
 from hypothesis import example, given
 from hypothesis import strategies as st
 from safetensors.torch import load, save
@@ -69,7 +68,7 @@ def used(path) -> None:
     answer(path, lambda: save_model(saved.model, path, encoding=saved.encoding, eye=saved.eye, poses=saved.poses))
 
 
-@holds(300)
+@holds(120)
 @given(damaged(list(FILES.values())) | st.binary(max_size=200))
 def model_files(data):
     path = FOLDER / "model.safetensors"
@@ -99,14 +98,13 @@ def file_of(outer, inner, rest: bytes) -> bytes:
 HUGE = st.sampled_from(
     [0, -1, 10**9, 2**40, 2**62, 2**63, 1e30, float("nan"), True, None, "x", [], [10**9], [1e300, 5]]
 )
+FIELDS = {name: list(cheap(name).parameters) for name in NAMES}
 parameters = st.sampled_from(NAMES).flatmap(
-    lambda name: st.tuples(
-        st.just(name), st.dictionaries(st.sampled_from([f.name for f in dataclasses.fields(cheap(name.removeprefix("opponent-"))) if f.init]), HUGE)
-    )
-)  # fmt: skip
+    lambda name: st.tuples(st.just(name), st.dictionaries(st.sampled_from(FIELDS[name]), HUGE))
+)
 
 
-@holds(400)
+@holds(160)
 @given(st.sampled_from(NAMES).flatmap(lambda name: st.tuples(st.just(name), damaged_json(PARTS[name][1]))) | parameters.map(
     lambda found: (found[0], PARTS[found[0]][1] | {"parameters": PARTS[found[0]][1]["parameters"] | found[1]})))  # fmt: skip
 @example(("rbm", "[" * 100_000))
@@ -135,7 +133,7 @@ shapes = st.lists(st.sampled_from([0, 1, 2, 3, 8, 24]), max_size=4) | st.sampled
 )
 
 
-@holds(400)
+@holds(160)
 @given(st.sampled_from(NAMES), st.data())
 def model_tensors(name, data):
     tensors, inner = dict(TENSORS[name]), dict(PARTS[name][1])
@@ -160,7 +158,7 @@ class Runs:
         return os.system, (f"touch {FOLDER}/was-run",)
 
 
-@holds(20)
+@holds(15)
 @given(st.integers(0, 5), st.booleans())
 def pickles(protocol, zipped):
     path = FOLDER / "pickle.safetensors"
@@ -182,7 +180,7 @@ good = st.lists(
 )
 
 
-@holds(300)
+@holds(120)
 @given(
     chains | st.builds(lambda first, rest: " | ".join([first, *rest]), st.sampled_from(list(SOURCES)), good), st.data()
 )
@@ -203,7 +201,7 @@ def encodings(text, data):
 numbers = st.sampled_from([0.0, 1.0, -1.0, 1e-30, 1e6, 1e12, 1e18, 1e38, float("nan"), float("inf")])
 
 
-@holds(300)
+@holds(120)
 @given(st.sampled_from(NAMES), st.data())
 def models_on_anything(name, data):
     def tensor() -> torch.Tensor:
@@ -230,7 +228,7 @@ def models_on_anything(name, data):
         answer(None, lambda: model.partial_fit(tensor()))
 
 
-@holds(300)
+@holds(120)
 @given(parameters)
 def model_parameters(found):
     name, given_ = found

@@ -25,7 +25,7 @@ odd = (
 )
 
 
-@holds(300)
+@holds(120)
 @given(st.dictionaries(st.sampled_from([field.name for field in dataclasses.fields(Eye)]), odd))
 def eyes(numbers):
     eye = answer(None, lambda: Eye(**numbers))
@@ -49,7 +49,7 @@ poses = st.lists(
 )
 
 
-@holds(400)
+@holds(160)
 @given(poses | st.lists(st.lists(odd, max_size=4), max_size=4) | VALUES, st.sampled_from(RENDERERS))
 @example([[1e30, 0, 0]], RENDERERS[0])
 @example([[0, 0, 1e300]], RENDERERS[0])
@@ -61,12 +61,9 @@ def views(at, renderer):
         assert np.array_equal(views, np.concatenate([renderer.render([pose]) for pose in at] or [views]))
 
 
-@holds(300)
+@holds(120)
 @given(st.lists(st.lists(odd, max_size=4), max_size=5) | poses, odd)
 def routes(points, spacing):
-    def made() -> Route:
-        return Route(np.array(points, dtype=float))
-
     try:
         points = np.array(points, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -79,7 +76,7 @@ def routes(points, spacing):
             answer(None, lambda: route.resampled(spacing))
 
 
-@holds(300)
+@holds(120)
 @given(
     st.dictionaries(
         st.sampled_from([field.name for field in dataclasses.fields(WorldParams)]) | st.text(max_size=3), VALUES
@@ -95,13 +92,13 @@ TINY = World.generate("tiny", 0)
 small = st.sampled_from([0.5, 1.0, 2.0]) | odd.filter(lambda length: isinstance(length, int | float))
 
 
-@holds(20)
+@holds(15)
 @given(odd, small, st.none() | st.tuples(odd.filter(lambda x: isinstance(x, int | float)), st.floats(0, 3)))
 def generated_routes(seed, length, goal):
     answer(None, lambda: generate_route(TINY, seed, length, goal))
 
 
-@holds(20)
+@holds(15)
 @given(st.floats(0, 1e7), st.floats(0, 1e7))
 @example(1e7, 1e7)
 @example(0.0, 0.0)
@@ -133,7 +130,8 @@ FLAGS = {
 }  # fmt: skip
 (FOLDER / "r.csv").write_text("x_m,y_m\n0.5,0.5\n1,0.5\n")
 QUICK = {
-    "world": ["--out", "w.glb", "--preset", "tiny"], "view": ["--world", "tiny", "--size", "8x3"], "route": ["--world", "tiny", "--length-m", "1"],
+    "world": ["--out", "w.glb", "--preset", "tiny"], "view": ["--world", "tiny", "--size", "8x3"],
+    "route": ["--world", "tiny", "--length-m", "1"],
     "run": ["--world", "tiny", "--size", "16x4", "--route", "r.csv", "--spacing-m", "0.2", "--overwrite", "--max-steps", "2"],
     "database grid": ["--out", "g", "--size", "8x3", "--world", "tiny", "--spacing-m", "2"],
     "database route": ["--out", "d", "--size", "8x3", "--world", "tiny", "--route", "r.csv", "--spacing-m", "0.3"],
@@ -154,7 +152,7 @@ LEARN = [
 ]
 
 
-@holds(60)
+@holds(24)
 @given(st.sampled_from(list(FLAGS)).flatmap(lambda command: st.tuples(
     st.just(command), st.dictionaries(st.sampled_from(FLAGS[command]), texts, min_size=1, max_size=2))))  # fmt: skip
 def command_line(found):

@@ -271,6 +271,7 @@ def test_databases_that_do_not_fit_a_study_are_refused(material, tmp_path):
         write_database(tmp_path / "grid", renderer, Grid.over(published_part(WORLD.field), 0.2))
         write_database(tmp_path / "route", renderer, ROUTE.resampled(0.1).poses)
         write_database(tmp_path / "fine", renderer, ROUTE.resampled(0.02).poses)
+        write_database(tmp_path / "turned", renderer, ROUTE.resampled(0.02).poses + [0, 0, np.pi / 2])
         write_database(tmp_path / "coarse", renderer, Grid(begin=(0.0, 0.0), spacing=0.1, size=(2, 2)))
     with open_renderer(WORLD, Eye(width=36, height=15, samples=1)) as renderer:
         write_database(tmp_path / "small", renderer, ROUTE.resampled(0.02).poses)
@@ -278,6 +279,7 @@ def test_databases_that_do_not_fit_a_study_are_refused(material, tmp_path):
         ("route", "route", "give one of a grid"),
         ("grid", "small", "different sizes"),
         ("grid", "route", "20 route views; a study needs at least 48"),
+        ("grid", "turned", "headings are 90 degrees off the path"),
         ("coarse", "fine", "0 grid places lie within 0.2 m"),
     )
     for grid, route, why in cases:

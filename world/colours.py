@@ -28,7 +28,10 @@ def texture_factor(mesh) -> Float[np.ndarray, "3"]:
 
 
 def face_rgb(mesh) -> UInt8[np.ndarray, "n 3"]:
-    """One colour a triangle: its own, the mean of its corners', or the mean of its texture over it. Raises InputError for one whose places are not finite."""
+    """One colour a triangle: its own, the mean of its corners', or the mean of its texture over it.
+
+    Raises InputError for a texture whose places are not finite.
+    """
     image = texture_of(mesh)
     if image is not None:
         if not (np.abs(mesh.visual.uv) <= FARTHEST).all():

@@ -19,6 +19,7 @@ from .scene import World
 BODY_HEIGHT = 0.06  # m; what hangs higher is walked under
 STEP_HEIGHT = 0.008  # m; what lies lower is walked over
 CELL = 0.02  # m, of the occupancy grid
+RIM = 20  # cells around the field, so that obstacles just outside count
 NODE = 3  # cells between the nodes that paths are planned through
 KEEP_AWAY = 0.04  # m from every obstacle
 PREFERRED = 0.12  # m; tighter than this costs more than twice the way
@@ -54,13 +55,13 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     goal: where it ends (m), to within a decimetre; so routes with several seeds lead to one place.
     Raises InputError where the world has no room for it, or none at the goal.
     """
-    if not (np.isfinite(length) and length >= 0.1):
+    if not 0.1 <= length < np.inf:
         raise InputError(f"a route of {length} m; give a length of at least 0.1 m")
     rng, field = seeded(seed), world.field
     sides = np.array([field.x_max - field.x_min, field.y_max - field.y_min])
     length = min(float(length), 0.8 * float(np.hypot(*sides)))
     margin = min(0.3, 0.05 * float(sides.min()))
-    if np.prod(sides / CELL) > MOST_CELLS:
+    if np.prod(sides / CELL + 2 * RIM) > MOST_CELLS:
         raise InputError(
             f"the field ({field}) is too large to look for a route in, {MOST_CELLS * CELL**2:,.0f} m2 at most; give a route"
         )
@@ -128,15 +129,14 @@ def _distance_to(shapes: Float[np.ndarray, "n 6 2"], xy: Float[np.ndarray, "n 2"
 
 def _room(world: World, inside: Bounds) -> Float[np.ndarray, "rows columns"]:
     """Clearance (m) on a grid of cells from the lower left corner of `inside` (rows run along y), to about a cell."""
-    rim = 20  # cells around, so that obstacles just outside count
-    size = np.ceil((np.array(inside[2:]) - np.array(inside[:2])) / CELL).astype(int) + 1 + 2 * rim
+    size = np.ceil((np.array(inside[2:]) - np.array(inside[:2])) / CELL).astype(int) + 1 + 2 * RIM
     free = np.full((size[1], size[0]), 255, np.uint8)
-    cells = (_footprints(world) - np.array(inside[:2])) / CELL + rim
+    cells = (_footprints(world) - np.array(inside[:2])) / CELL + RIM
     near = np.logical_and(cells.max(axis=1) > 0, cells.min(axis=1) < size).all(axis=1)
     for shape in np.round(cells[near] * 16).astype(np.int32):
         cv2.fillConvexPoly(free, shape, 0, shift=4)
     distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * CELL
-    return distance[rim:-rim, rim:-rim]
+    return distance[RIM:-RIM, RIM:-RIM]
 
 
 def _graph(room: Float[np.ndarray, "rows columns"], inside: Bounds) -> tuple[Float[np.ndarray, "n 2"], csr_array]:

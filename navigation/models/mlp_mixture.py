@@ -25,7 +25,7 @@ class MLPMixture(MLPRotation):
     name = "mlp-mixture"
     paper = "the thesis, future work; Jacobs et al. 1991"
 
-    LIMITS = MLPRotation.LIMITS | {"stretches": (1, 200)}  # noqa: RUF012 (the readout is all units times all stretches)
+    LIMITS = MLPRotation.LIMITS | {"stretches": (1, 200)}
     stretches: int = 8
     units: int = 20
 

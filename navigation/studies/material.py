@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from render.database import read_database
+from render.database_check import other_convention
 from render.database_files import as_kept
 from render.database_writing import Grid, published_part
 from render.eye import Eye
@@ -103,6 +104,8 @@ def material_of_databases(grid: Path, route: Path) -> Material:
     views = Route(route_database.poses)
     if len(views.poses) < len(route_database.poses):
         raise InputError(f"{route}: two views in a row stand at one place; a study needs them apart")
+    if meant := other_convention(views.poses):
+        raise InputError(f"{route}: {meant}; a study measures against them")
     rows = np.flatnonzero(views.nearest(grid_database.poses[:, :2])[0] <= BESIDE)
     places = grid_database.poses[rows]
     check_enough(views, places)
