@@ -279,7 +279,7 @@ def test_databases_that_do_not_fit_a_study_are_refused(material, tmp_path):
         ("route", "route", "give one of a grid"),
         ("grid", "small", "different sizes"),
         ("grid", "route", "20 route views; a study needs at least 48"),
-        ("grid", "turned", "headings are 90 degrees off the path"),
+        ("grid", "turned", "headings are 8. degrees off the path"),
         ("coarse", "fine", "0 grid places lie within 0.2 m"),
     )
     for grid, route, why in cases:
