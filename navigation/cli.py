@@ -23,7 +23,7 @@ from .learning_commands import (
 )
 from .sight_commands import RouteCommand, ViewCommand, WorldCommand
 from .study_commands import StudyCommand, ThesisCommand
-from .sweep_commands import SweepCommand
+from .sweep_commands import ReportCommand, SweepCommand
 from .terminal import say, show
 
 # A command by its name, or a sentence and the commands that go under one name.
@@ -38,6 +38,7 @@ COMMANDS: dict[str, Any] = {
     "run": RunCommand,
     "play": PlayCommand,
     "sweep": SweepCommand,
+    "report": ReportCommand,
     "replicate": ("Re-run a published study and write a report to read beside it.", {"thesis": ThesisCommand}),
     "study": StudyCommand,
     "database": (

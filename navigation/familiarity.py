@@ -21,7 +21,7 @@ from .rotation import in_parts
 WIDEST = 8192  # columns of a view: the engine's matrices have half as many rows, and a column each
 NARROWEST = 4  # as of an eye
 LARGEST = 1e12  # number in a view, or learned: sums of squares over whole views stay far from float32's largest
-WHOLE = ("index", "wiring")  # what is learned as whole numbers; labels are of their own type, and all else is float32
+WHOLE = ("index", "wiring", "rows", "columns")  # what is learned as whole numbers; labels are of their own type, and all else is float32
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]
@@ -208,7 +208,7 @@ class Model(ABC):
             kind, name = tensor.dtype, key.rpartition(".")[2]
             if kind != (torch.int64 if name in WHOLE else torch.float32) and name != "classes":
                 raise InputError(f"{self.name}: {key} of type {kind}, which it does not learn")
-            if not all_bounded(tensor):
+            if tensor.is_floating_point() and not all_bounded(tensor):
                 raise InputError(
                     f"{self.name}: the {key} are not finite, or over {LARGEST:g}; if they grew without bound, give a lower rate"
                 )

@@ -48,3 +48,27 @@ class SweepCommand:
             return run_sweep(
                 sweep, self.out, scheduler=self.scheduler, workers=self.workers, record=int(record[1]), progress=report
             )
+
+
+@dataclass
+class ReportCommand:
+    """Say what the runs of a sweep come to: a page with success and error by each axis, models in pairs, and the worst walks."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
+    """Folder of the sweep; it may still go on."""
+    worst: int = 5
+    """How many of the worst walks to show."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from .sweeps.report import REPORT, RESULTS, write_sweep_report
+
+        if self.worst < 0:
+            raise InputError(f"--worst {self.worst}: give 0 or more")
+        with progress("drawing", "figures") as report:
+            results = write_sweep_report(self.folder, worst=self.worst, progress=report)
+        return {
+            "report": str(self.folder / REPORT), "results": str(self.folder / RESULTS), "runs": results["runs"],
+            "could_not_run": len(results["could_not_run"]),
+        } | {measure: found["value"] for measure, found in results["measures"].items()}  # fmt: skip

@@ -49,8 +49,8 @@ class Trajectory:
         return np.array([row[1:3] for row in self.rows]).reshape(-1, 2)
 
     def summary(self) -> dict[str, Any]:
-        """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), resets; why it failed (None where it
-        arrived without a reset), how many steps were poor or failed, and how often for each cause.
+        """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), mean absolute heading error (degrees),
+        resets; why it failed (None where it arrived without a reset), how many steps were poor or failed, and how often for each cause.
         """
         deviation, resets = np.array(self.column("deviation_m")), self.column("reset")
         reason, causes = self.column("reason")[-1], self.column("cause")
@@ -62,6 +62,7 @@ class Trajectory:
             "steps": len(self) - 1,
             "mean_deviation_m": float(deviation.mean()),
             "max_deviation_m": float(deviation.max()),
+            "mean_error_deg": float(np.abs(self.column("error_deg")).mean()),
             "resets": sum(reset != "" for reset in resets),
             "cause": walk_cause(self.column("along_m"), causes, failed),
             "poor_steps": counts.total(),

@@ -106,8 +106,8 @@ def test_run_arrives_and_leaves_a_whole_folder(capfd, tmp_path):
     assert code == 0
     result = json.loads(printed)
     assert set(result) == {
-        "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "resets", "cause", "poor_steps", "causes", "seconds",
-        "steps_per_second", "recording",
+        "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "mean_error_deg", "resets", "cause", "poor_steps", "causes",
+        "seconds", "steps_per_second", "recording",
     }  # fmt: skip
     assert result["arrived"]
     assert result["reason"] == "arrived"

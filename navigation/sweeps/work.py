@@ -97,6 +97,12 @@ def lesson_key(options: RunOptions) -> str:
     return "lesson-" + _digest(options, {each.name for each in dataclasses.fields(LearningOptions)})
 
 
+def options_of(row: dict[str, Any]) -> RunOptions:
+    """The settings of a run from its row of the table."""
+    settings = {each.name: row[each.name] for each in dataclasses.fields(RunOptions)}
+    return RunOptions(**settings | {"route": None if row["route"] is None else Path(row["route"])})
+
+
 def _digest(options: RunOptions, names: set[str]) -> str:
     settings = {name: getattr(options, name) for name in sorted(names)}
     world_seed, route_seed = (

@@ -1,0 +1,121 @@
+"""What the runs of a sweep say together: means with bootstrap confidence intervals, by each axis and between models."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float, Int
+
+SAMPLES = 4000  # of a bootstrap
+CONFIDENCE = 0.95
+MEASURES = {  # what is compared: column of the table -> words
+    "arrived": "share that arrived",
+    "mean_deviation_m": "mean deviation from the route (m)",
+    "mean_error_deg": "mean heading error (°)",
+    "resets": "times put back on the route",
+}
+HIGHER_IS_BETTER = ("arrived",)
+PLACES = ("world", "world_seed", "route", "route_seed", "route_length_m")  # settings that make a world and a route
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean, and the ends of its confidence interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pairing:
+    """Two models compared over pairs of runs that are alike in all else. difference: of the first less the second, by measure.
+
+    better, worse: pairs in which the first did better, or worse, than the second.
+    """
+
+    first: str
+    second: str
+    pairs: int
+    difference: dict[str, Interval]
+    better: dict[str, int]
+    worse: dict[str, int]
+
+
+def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"], seed: int = 0) -> Interval:
+    """Mean of values and its percentile bootstrap interval. Whole groups are drawn, as runs in one world are not independent.
+
+    groups: number of the group of each value. Where there is but one group, single values are drawn. nan where there are no values.
+    """
+    if len(values) == 0:
+        return Interval(np.nan, np.nan, np.nan)
+    if len(np.unique(groups)) == 1:
+        groups = np.arange(len(values))
+    _, number = np.unique(groups, return_inverse=True)
+    sums, counts = np.bincount(number, weights=values), np.bincount(number)
+    drawn = np.random.default_rng(seed).multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=SAMPLES)
+    means = (drawn @ sums) / (drawn @ counts)
+    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Interval(float(values.mean()), float(low), float(high))
+
+
+def places_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
+    """Number of the world and route of each run."""
+    seeds = {name: table[name].fillna(table["seed"]) for name in ("world_seed", "route_seed")}
+    return table.assign(**seeds).groupby(list(PLACES), dropna=False, sort=False).ngroup().to_numpy()
+
+
+def axes_of(table: pd.DataFrame, settings: Sequence[str]) -> dict[str, list[str]]:
+    """What varies between runs: by the name of an axis, the settings that make it. Those that vary together are one axis."""
+    axes: dict[bytes, list[str]] = {}
+    for name in settings:
+        partition, values = pd.factorize(table[name].astype("object"), use_na_sentinel=False)
+        if len(values) > 1:
+            axes.setdefault(partition.tobytes(), []).append(name)
+    return {" and ".join(names): names for names in axes.values()}
+
+
+def means(table: pd.DataFrame, measures: Sequence[str]) -> dict[str, Interval]:
+    """Mean and interval of each measure over runs."""
+    groups = places_of(table)
+    return {measure: mean_interval(table[measure].to_numpy(dtype=float), groups) for measure in measures}
+
+
+def by_axis(
+    table: pd.DataFrame, names: list[str], measures: Sequence[str]
+) -> dict[str, tuple[int, dict[str, Interval]]]:
+    """Number of runs, and `means`, for each choice of an axis, in order."""
+    parts = table.groupby(names, dropna=False, sort=True)
+    return {words(key): (len(part), means(part, measures)) for key, part in parts}
+
+
+def words(key: object) -> str:
+    """A choice of an axis as people read it."""
+    values: tuple[Any, ...] = key if isinstance(key, tuple) else (key,)
+    return ", ".join(
+        "by default" if pd.isna(value) else f"{value:g}" if isinstance(value, float) else str(value) for value in values
+    )
+
+
+def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[str], axis: list[str]) -> list[Pairing]:
+    """Every two choices of an axis, of models for example, compared over the runs for which all other settings are alike."""
+    rest = [name for name in settings if name not in axis]
+    parts = {words(key): part for key, part in table.groupby(axis, dropna=False, sort=True)}
+    found = []
+    for first, second in combinations(parts, 2):
+        both = parts[first].merge(parts[second], on=rest, suffixes=("", "_other"))
+        if both.empty:
+            continue
+        groups, difference, better, worse = places_of(both), {}, {}, {}
+        for measure in measures:
+            values = both[measure].to_numpy(dtype=float) - both[f"{measure}_other"].to_numpy(dtype=float)
+            gain = values if measure in HIGHER_IS_BETTER else -values
+            difference[measure] = mean_interval(values, groups)
+            better[measure], worse[measure] = int((gain > 0).sum()), int((gain < 0).sum())
+        found.append(
+            Pairing(first=first, second=second, pairs=len(both), difference=difference, better=better, worse=worse)
+        )
+    return found
