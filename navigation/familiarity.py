@@ -21,7 +21,8 @@ from .rotation import in_parts
 WIDEST = 8192  # columns of a view: the engine's matrices have half as many rows, and a column each
 NARROWEST = 4  # as of an eye
 LARGEST = 1e12  # number in a view, or learned: sums of squares over whole views stay far from float32's largest
-WHOLE = ("index", "wiring", "rows", "columns")  # what is learned as whole numbers; labels are of their own type, and all else is float32
+# What is learned as whole numbers; labels are of their own type, and all else is float32.
+WHOLE = ("index", "wiring", "rows", "columns")
 
 Images = Float32[torch.Tensor, "n h w"]
 Scans = Float32[torch.Tensor, "n w"]

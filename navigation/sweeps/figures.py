@@ -13,7 +13,7 @@ from world.scene import World
 
 from ..plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR
 from ..studies.drawing import GOOD_COLOUR, SOFT_COLOUR, canvas, draw_route, panorama, plan
-from .statistics import MEASURES, Interval, by_axis, words
+from .statistics import MEASURES, Interval, by_axis, spoken, words
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)
 MOST_CHOICES = 24  # of an axis that are drawn by name
@@ -25,10 +25,13 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
     parts = [(words(key), part) for key, part in table.groupby(by, dropna=False, sort=True)] if by else [("", table)]
     names = list(by_axis(table, axis, []))
     numeric = len(axis) == 1 and pd.api.types.is_numeric_dtype(table[axis[0]])
+    joined = numeric and not axis[0].endswith("seed")
     places = np.sort(table[axis[0]].unique().astype(float)) if numeric else np.arange(len(names), dtype=float)
     room = np.diff(places).min() if len(places) > 1 else 1.0
     for number, (label, part) in enumerate(parts):
-        shift = 0.5 * room * ((number + 0.5) / len(parts) - 0.5)  # so that intervals do not cover each other
+        shift = (
+            (0.3 if numeric else 0.6) * room * ((number + 0.5) / len(parts) - 0.5)
+        )  # so that intervals do not cover each other
         found = {name: values for name, (_, values) in by_axis(part, axis, measures).items()}
         at = [place for place, name in zip(places, names, strict=True) if name in found]
         for panel, measure in zip(axes[:, 0], measures, strict=True):
@@ -38,13 +41,13 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
                 [found[name][measure] for name in names if name in found],
                 label,
                 number,
-                numeric,
+                joined,
             )
     for panel, measure in zip(axes[:, 0], measures, strict=True):
         panel.set_ylabel(MEASURES[measure].replace(" (", "\n("))
         panel.grid(axis="y", color="#00000018")
         panel.set_ylim(bottom=0, top=1.05 if measure == "arrived" else None)
-    axes[-1, 0].set_xlabel(" and ".join(axis).replace("_", " "))
+    axes[-1, 0].set_xlabel(" and ".join(map(spoken, axis)))
     if numeric:
         axes[-1, 0].set_xticks(places if len(places) <= 12 else places[:: len(places) // 10])
     elif len(names) <= MOST_CHOICES:

@@ -13,13 +13,13 @@ from render.renderer import open_renderer
 from world.errors import InputError
 from world.files import replacing
 
-from ..failures import CAUSES
+from ..failures import CAUSES, Evidence, in_words
 from ..pages import page, picture
 from ..studies.findings import plain
 from ..training import training_views
 from .figures import along_axis, read_steps, seen, walked
 from .spec import SETTINGS
-from .statistics import MEASURES, Interval, axes_of, by_axis, means, pairings, words
+from .statistics import MEASURES, Interval, axes_of, by_axis, means, pairings, spoken, words
 from .store import Store, table_of
 from .sweep import WORST, worst_of
 from .work import options_of
@@ -58,7 +58,7 @@ def write_sweep_report(
         progress(number, len(axes) + len(shown))
         lines = [] if names == by else by
         drawn = picture(along_axis(ran, names, measures, lines), folder / FIGURES, f"by-{'-'.join(names)}")
-        exhibits.append({"name": name, "rows": _rows(results["by"][name]), **drawn})
+        exhibits.append({"id": f"by-{'-'.join(names)}", "name": name, "rows": _rows(results["by"][name]), **drawn})
     cases = []
     for number, key in enumerate(shown, len(axes)):
         progress(number, len(axes) + len(shown))
@@ -128,11 +128,11 @@ def _about(table: pd.DataFrame, ran: pd.DataFrame, axes: dict[str, list[str]]) -
         if name not in NOT_AXES and not any(name in names for names in axes.values())
     }
     said = [
-        f"{name.replace('_', ' ')} {value}"
+        f"{spoken(name)} {value}"
         for name, value in fixed.items()
         if not pd.isna(value) and value != SETTINGS[name].default
     ]
-    varied = [f"{name.replace('_', ' ')} ({ran.groupby(names, dropna=False).ngroups})" for name, names in axes.items()]
+    varied = [f"{name}: {ran.groupby(names, dropna=False).ngroups}" for name, names in axes.items()]
     return {
         "Runs": f"{len(table)}, of which {len(ran)} could be done; {int(ran['arrived'].sum())} arrived",
         "Varied": "; ".join(varied) or "nothing",
@@ -146,7 +146,8 @@ def _case(key: str, row: dict[str, Any], steps: pd.DataFrame, folder: Path) -> d
     at = _turning_point(row, steps)
     here = np.column_stack([steps["x_m"], steps["y_m"], np.radians(steps["heading_deg"])])[[at]]
     shown = {
-        "key": key, "command": row["command"], "settings": row, "words": _in_words(row), "step": at,
+        "key": key, "command": row["command"], "settings": row, "words": _outcome(row), "step": at,
+        "evidence": evidence_words(steps.iloc[at]),
         "recording": f"{WORST}/{key}/recording.rrd" if (folder / WORST / key / "summary.json").exists() else None,
     }  # fmt: skip
     try:
@@ -173,7 +174,19 @@ def _turning_point(row: dict[str, Any], steps: pd.DataFrame) -> int:
     return int(same[-1]) if len(same) else int(steps["deviation_m"].idxmax())
 
 
-def _in_words(row: dict[str, Any]) -> str:
+def evidence_words(step: pd.Series) -> str | None:
+    """Why a step of a trajectory was poor, with its evidence; None for a good one."""
+    known = step.dropna().to_dict()
+    if "cause" not in known:
+        return None
+    error, turning = (float(np.radians(known[name])) for name in ("error_deg", "turning_deg"))
+    nearest, recognised = known.get("nearest_view_m"), known.get("recognised_view_m")
+    return in_words(
+        Evidence(covered=known["covered"], nearest=nearest, recognised=recognised, error=error, turning=turning)
+    )
+
+
+def _outcome(row: dict[str, Any]) -> str:
     """What became of a walk."""
     end = f"{row['reason']} after {row['steps']} steps, {100 * row['mean_deviation_m']:.1f} cm off the route on average"
     return end + (f", put back {row['resets']} times" if row["resets"] else "")

@@ -18,6 +18,7 @@ MEASURES = {  # what is compared: column of the table -> words
     "resets": "times put back on the route",
 }
 HIGHER_IS_BETTER = ("arrived",)
+_RANK = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # what is asked first, and last
 PLACES = ("world", "world_seed", "route", "route_seed", "route_length_m")  # settings that make a world and a route
 
 
@@ -75,7 +76,15 @@ def axes_of(table: pd.DataFrame, settings: Sequence[str]) -> dict[str, list[str]
         partition, values = pd.factorize(table[name].astype("object"), use_na_sentinel=False)
         if len(values) > 1:
             axes.setdefault(partition.tobytes(), []).append(name)
-    return {" and ".join(names): names for names in axes.values()}
+    inorder = sorted(axes.values(), key=lambda names: _RANK.get(names[0], 1))
+    return {" and ".join(map(spoken, names)): names for names in inorder}
+
+
+def spoken(setting: str) -> str:
+    """A setting's name as people say it, its unit in parentheses."""
+    name, _, unit = setting.rpartition("_")
+    units = {"m": "m", "deg": "°"}
+    return f"{name.replace('_', ' ')} ({units[unit]})" if unit in units else setting.replace("_", " ")
 
 
 def means(table: pd.DataFrame, measures: Sequence[str]) -> dict[str, Interval]:
