@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import shlex
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ import tyro
 from world.errors import InputError
 
 from .learning_options import FILE_SUFFIX, LearningOptions, Lesson, RunOptions
-from .options import RouteOptions
+from .options import RouteOptions, words_of
 from .terminal import progress, say
 
 if TYPE_CHECKING:
@@ -215,6 +216,7 @@ class RunCommand(RunOptions):
             with progress("walking", "steps") as report:
                 return record_walk(
                     agent, start, self.out, overwrite=self.overwrite, training_poses=learned, settings=settings,
+                    command=f"tussock run {words_of(self, RunOptions)} --out {shlex.quote(str(self.out))} --overwrite",
                     viewer=viewer, progress=report,
                 )  # fmt: skip
 

@@ -57,7 +57,7 @@ class Recording:
         self, path: Path, world: World, route: Route, *, renderer: Renderer | None = None,
         training_poses: Float[np.ndarray, "n 3"] | None = None, lost: float = 0.5, live: str | None = None, title: str = "",
     ):  # fmt: skip
-        self._renderer, self._training_poses = renderer, training_poses
+        self._path, self._renderer, self._training_poses = path, renderer, training_poses
         self._waiting: list[tuple[Step, Evidence | None]] = []
         self._previous: Step | None = None
         self._named: tuple[str, Pose] | None = None  # the cause that was last written beside its mark, and where
@@ -154,7 +154,10 @@ class Recording:
             self._send_causes([(step, evidence) for step, evidence in waiting if evidence is not None])
             self._log_events(waiting)
         file, *viewers = self._streams
-        file.flush()
+        try:
+            file.flush()
+        except RuntimeError as error:
+            raise InputError(f"{self._path} cannot be written any more ({error}); make room on its disk") from error
         for viewer in viewers:
             try:
                 viewer.flush(timeout_sec=5)

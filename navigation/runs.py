@@ -20,6 +20,7 @@ from .failures import Witness
 from .plots import overview
 from .recording import Recording, check_viewer, watch
 from .recording import screenshot as save_screenshot
+from .terminal import say
 from .trajectory import Trajectory
 
 RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
@@ -29,7 +30,8 @@ RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
     "overview.png",
     "route.csv",
 )
-FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE)
+UNFINISHED = "UNFINISHED.txt"  # is there until all the others are
+FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE, UNFINISHED)
 
 
 def check_run_folder(
@@ -48,28 +50,40 @@ def check_run_folder(
         raise InputError(f"{out} cannot be written: {existing} is read-only; give another --out")
     earlier = _run_files(out)
     if earlier and not overwrite:
-        raise _taken(out, earlier[0])
+        raise _taken(out)
     for path in earlier:
         if any(given.exists() and given.samefile(path) for given in inputs):
             raise InputError(f"{path} is used by this run and would be replaced by it; give another --out")
 
 
-def _claim(out: Path, overwrite: bool) -> None:
-    """Make the folder of a run, this one's alone. Raises InputError where another run holds it or it cannot be written."""
+def _claim(out: Path, overwrite: bool, command: str) -> None:
+    """Make the folder of a run, this one's alone, and say in it that the run is not finished.
+
+    Raises InputError where another run holds it or it cannot be written.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         if overwrite:
             for path in _run_files(out):
                 path.unlink()
         (out / RECORDING).open("xb").close()  # fails where another run was quicker
+        (out / UNFINISHED).write_text(
+            f"This run goes on, or it was interrupted: then {RECORDING} opens up to where it was.\n\n"
+            f"To resume it, walk again from its start, which takes the same steps:\n\n    {command}\n\n"
+            "To discard it, delete this folder.\n"
+        )
     except FileExistsError:
-        raise _taken(out, out / RECORDING) from None
+        raise _taken(out) from None
     except OSError as error:
         raise InputError(f"{out} cannot be written ({error.strerror}); give another --out") from error
 
 
-def _taken(out: Path, path: Path) -> InputError:
-    return InputError(f"{out} already holds a run ({path.name}); give another --out, or --overwrite to replace it")
+def _taken(out: Path) -> InputError:
+    if (out / UNFINISHED).exists():
+        return InputError(
+            f"{out} already holds a run that is not finished; see {out / UNFINISHED}, or give another --out"
+        )
+    return InputError(f"{out} already holds a run; give another --out, or --overwrite to replace it")
 
 
 def _run_files(out: Path) -> list[Path]:
@@ -78,16 +92,18 @@ def _run_files(out: Path) -> list[Path]:
 
 def record_walk(
     agent: Agent, start: Pose, out: Path, *, overwrite: bool = False, training_poses: Float[np.ndarray, "n 3"] | None = None,
-    settings: dict[str, Any] | None = None, viewer: str | None = None, progress: Callable[[int, int], object] = lambda done, total: None,
+    settings: dict[str, Any] | None = None, command: str = "the same as before, with overwrite", viewer: str | None = None,
+    progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Walk from start and leave the walk in the folder `out`; return its summary, whose times are those of the walk alone.
 
     overwrite: replace the run that the folder holds. training_poses: of the views the model knows, in their order: shows the
     recognised view in the recording, and where views were learned is part of the evidence of failures: without them the causes rest on what
     else there is. settings: kept in summary.json. progress(done, total): steps, of the most there can be.
-    An interrupted walk leaves its recording and trajectory, and no summary.
+    command: what repeats the walk. An interrupted walk leaves its recording and trajectory, no summary, and a file that says how to
+    go on. Raises InputError where the folder is taken, or cannot be written to the end.
     """
-    _claim(out, overwrite)
+    _claim(out, overwrite, command)
     world, route, trajectory = agent.renderer.world, agent.route, Trajectory()
     witness = Witness(agent.renderer, agent.encoding, route, training_poses)
     began = time.perf_counter()
@@ -118,6 +134,7 @@ def record_walk(
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
         partial.write_text(json.dumps(summary | {"settings": settings or {}}, indent=2, default=str) + "\n")
+    (out / UNFINISHED).unlink()
     return summary | {"recording": str(out / RECORDING)}
 
 
@@ -129,6 +146,8 @@ def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dic
     recording = run / RECORDING if run.is_dir() else run
     if not recording.is_file():
         raise InputError(f"there is no recording {recording}; give the folder of a run")
+    if (recording.parent / UNFINISHED).exists():
+        say(f"this run is not finished; see {recording.parent / UNFINISHED}")
     if screenshot is not None and screenshot.suffix.lower() != ".png":
         raise InputError(f"{screenshot}: a picture of the viewer is written as .png")
     if screenshot is not None:

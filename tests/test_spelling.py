@@ -38,9 +38,9 @@ def value(default, choices, limits) -> st.SearchStrategy:
     if isinstance(default, tuple):
         return st.lists(value(default[0], choices, limits), min_size=1, max_size=4).map(tuple)
     if default is None:
-        return st.none() | st.integers(1, 10**6)
+        return st.none() | st.integers(*map(int, limits or (1, 10**6)))
     if isinstance(default, int):
-        return st.integers(1, 10**4)
+        return st.integers(*map(int, limits or (1, 10**4)))
     low, high = limits or (0.0, 1e300)
     numbers = st.floats(low, min(high, 1e300))
     names = st.sampled_from(sorted(choices)) if choices else st.nothing()
