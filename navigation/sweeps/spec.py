@@ -189,6 +189,7 @@ class _Reader:
     def line_of(self, table: str, key: str) -> int:
         """Number of the line where a key of a table stands; that of the table, or 1, where it cannot be told."""
         within, found = "", 1
+        spelled = re.sub(r"\\?[-_]", "[-_]", re.escape(key))  # as a flag or as a column
         for number, line in enumerate(self.lines, 1):
             header = re.match(r"\s*\[+\s*([^\]]+?)\s*\]+", line)
             if header:
@@ -196,7 +197,7 @@ class _Reader:
                 found = number if within.split(".")[0] in (table or key) else found
                 if within in (key, f"{table}.{key}"):
                     return number
-            elif within == table and re.match(rf"""\s*["']?{re.escape(key)}["']?\s*=""", line):
+            elif within == table and re.match(rf"""\s*["']?{spelled}["']?\s*=""", line):
                 return number
         return found
 
