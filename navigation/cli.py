@@ -21,6 +21,7 @@ from .learning_commands import (
     RunCommand,
     TrainCommand,
 )
+from .protocol_commands import REPLICATIONS
 from .sight_commands import RouteCommand, ViewCommand, WorldCommand
 from .study_commands import StudyCommand, ThesisCommand
 from .sweep_commands import ReportCommand, SweepCommand
@@ -39,7 +40,10 @@ COMMANDS: dict[str, Any] = {
     "play": PlayCommand,
     "sweep": SweepCommand,
     "report": ReportCommand,
-    "replicate": ("Re-run a published study and write a report to read beside it.", {"thesis": ThesisCommand}),
+    "replicate": (
+        "Re-run a published study and write a report to read beside it.",
+        {"thesis": ThesisCommand} | REPLICATIONS,
+    ),
     "study": StudyCommand,
     "database": (
         "Draw image databases in the BoB format, and look for what is wrong with them.",

@@ -162,6 +162,42 @@ class Clahe:
 
 
 @dataclass(frozen=True)
+class Widen:
+    """Each pixel averaged with its neighbours to the right, `columns` in all: pixels that much wider, and still one a column.
+
+    So a view of coarse pixels can be turned by less than one of them, as an eye is that turns and looks again.
+    """
+
+    columns: float
+    word: ClassVar[str] = "widen"
+
+    def __post_init__(self):
+        if not (1 <= self.columns <= 1000 and self.columns == round(self.columns)):
+            raise InputError(f"widen {self.columns:g}: give a whole number of columns from 1 to 1000")
+
+    def __call__(self, images: Images) -> Images:
+        total = images.copy()
+        for shift in range(1, int(self.columns)):
+            total += np.roll(images, -shift, axis=-1)
+        return total / np.float32(self.columns)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Each value times `factor`: less contrast, for models whose learning rate is meant for it."""
+
+    factor: float
+    word: ClassVar[str] = "scale"
+
+    def __post_init__(self):
+        if not 0 < self.factor <= 1:
+            raise InputError(f"scale {self.factor:g}: give a factor over 0 and up to 1")
+
+    def __call__(self, images: Images) -> Images:
+        return images * np.float32(self.factor)
+
+
+@dataclass(frozen=True)
 class VerticalEdges:
     """Strength of vertical edges: the absolute difference between each pixel and its neighbour to the right."""
 
@@ -188,10 +224,10 @@ def reduced(height: int, width: int, factor: float) -> tuple[int, int]:
     return max(1, round(height / factor)), max(4, round(width / factor))
 
 
-Filter = Grey | SkyMask | Invert | Clahe | Blur | Resize | Sample | VerticalEdges | Normalise
+Filter = Grey | SkyMask | Invert | Clahe | Blur | Resize | Sample | Widen | Scale | VerticalEdges | Normalise
 SOURCES: dict[str, type[Filter]] = {step.word: step for step in (Grey, SkyMask)}
 FILTERS: dict[str, type[Filter]] = {
-    step.word: step for step in (Blur, Resize, Sample, Invert, Clahe, VerticalEdges, Normalise)
+    step.word: step for step in (Blur, Resize, Sample, Widen, Scale, Invert, Clahe, VerticalEdges, Normalise)
 }
 PRESETS = {
     "grey": "grey | {blur}{resize}",
@@ -239,6 +275,8 @@ class Encoding:
             elif isinstance(step, Normalise):
                 high = float(np.sqrt(images.size - 1))  # of one pixel that differs from all others
                 low = -high
+            elif isinstance(step, Scale):
+                low, high = step.factor * low, step.factor * high
         return (images.shape[1], images.shape[2]), low, high
 
     def __str__(self) -> str:
