@@ -21,6 +21,8 @@ CHAINS = [
     "sky-mask | vertical-edges",
     "grey | normalise",
     "grey | invert",
+    "grey | resize 3 | widen 5",
+    "grey | normalise | scale 0.25",
     "sky-mask | blur 2 | vertical-edges | resize 3 | normalise",
 ]
 # With tiles, which turn with the eye.
@@ -105,6 +107,20 @@ def test_inverting_is_its_own_inverse_and_makes_white_black(views):
     assert np.allclose(Encoding.parse("grey | invert | invert")(views), grey, atol=1e-6)
 
 
+@pytest.mark.parametrize("columns", [1, 2, 5])
+def test_every_nth_of_the_widened_pixels_is_one_of_a_coarser_view(views, columns):
+    grey = Encoding.parse("grey")(views).numpy()
+    coarse = grey.reshape(*grey.shape[:2], -1, columns).mean(axis=3)
+    assert np.allclose(Encoding.parse(f"grey | widen {columns}")(views).numpy()[..., ::columns], coarse, atol=1e-6)
+
+
+def test_scaling_a_normalised_view_sets_its_deviation(views):
+    scaled = Encoding.parse("grey | normalise | scale 0.25")
+    assert np.allclose(scaled(views).std(dim=(1, 2), correction=0), 0.25, atol=1e-5)
+    shape, low, high = Encoding.parse("grey | normalise").bounds(30, 120)
+    assert scaled.bounds(30, 120) == (shape, low / 4, high / 4)
+
+
 @pytest.mark.parametrize(("clip", "tiles"), [(2, 4), (0.5, 5), (40, 2), (256, 3)])
 def test_equalised_images_are_opencvs_of_the_ring_laid_out_thrice(views, clip, tiles):
     views = views[:, : 30 // tiles * tiles]  # else OpenCV makes other tiles
@@ -168,6 +184,8 @@ def test_presets_are_chains(name, views):
         ("grey | normalise 3", "normalise takes no number"),
         ("grey | resize 0.5", "factor from 1"),
         ("grey | blur nan", "standard deviation"),
+        ("grey | widen 1.5", "give a whole number of columns"),
+        ("grey | scale 2", "give a factor over 0 and up to 1"),
         ("grey | invert 1", "invert takes no number"),
         ("grey | clahe 2", "clahe takes 2 numbers, got 'clahe 2'"),
         ("grey | clahe 0 8", "clip limit over 0"),

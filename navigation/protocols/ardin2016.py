@@ -93,7 +93,7 @@ ARDIN2016 = Protocol(
     quick_axes={"offset_m": [{"offset_m": side * each} for each in (0.05, 0.15, 0.25) for side in (1, -1)]},
     parameters=(
         Parameter(
-            name="Routes", published="15 of about 8 m, real ants', in the Sussex world",
+            name="Routes", published="15 of about 8 m in the Sussex world",
             here="those given, or 15 generated ones of 8 m",
         ),
         Parameter(name="Views learned", published="every 10 cm of the route", here="every 10 cm of the route"),
@@ -116,16 +116,16 @@ ARDIN2016 = Protocol(
         ),
     ),
     differences=(
-        "The mushroom body has no spikes: a sum and a ranking of its cells take their place (docs/models.md). It adapts to contrast and "
-        "averages familiarity over neighbouring rotations, 6 degrees.",
-        "Views are as fine as 36 x 10, but there is one such pixel every 2 degrees, so that rotations by 2 degrees need no interpolated "
-        "image: perfect memory and Infomax compare 180 x 10 overlapping pixels. The most familiar rotation is refined by a parabola "
-        "through its neighbours.",
+        "The mushroom body has no spikes: a sum and a ranking of its cells take their place (docs/models.md). It adapts to contrast "
+        "and averages familiarity over neighbouring rotations, 6 degrees.",
+        "Views are as fine as 36 x 10, but there is one such pixel every 2 degrees, so that rotations by 2 degrees need no "
+        "interpolated image: perfect memory and Infomax compare 180 x 10 overlapping pixels. The most familiar rotation is refined by "
+        "a parabola through its neighbours.",
         "An agent that walks 3 m without getting farther along the route, or leaves the world, is put back as well, and that is an error.",
-        "A start 20 or 25 cm beside the route is at or beyond the 20 cm that count as an error: one at 25 cm is put back at once, which "
-        "is one error of every model.",
-        "Clip limit (2) and tiles (8 x 8) of CLAHE, elevations (-15 to 60 degrees) and the learning rate of Infomax (that for "
-        "views in 0..1) are not known to us.",
+        "A start 20 or 25 cm beside the route is at or beyond the 20 cm that count as an error: one at 25 cm is put back at once, "
+        "which is one error of every model.",
+        "Clip limit (2) and tiles (8 x 8) of CLAHE, elevations (-15 to 60 degrees) and the learning rate of Infomax (that for views "
+        "in 0..1) are not known to us.",
         "The control draws a random heading for each different view and meets the same one where it sees the same view again.",
     ),
     measures=measures,

@@ -84,7 +84,7 @@ AZEVEDO2025 = Protocol(
     axes={"model": [{"model": "perfect-memory"}], "offset_m": _starts(STARTS)},
     worlds=75,
     quick_worlds=2,
-    quick_axes={"offset_m": _starts(9)},
+    quick_axes={"offset_m": _starts(12)},
     parameters=(
         Parameter(name="Route", published="20 m", here="20 m"),
         Parameter(name="Environments", published="75, generated", here="75, generated, of 40 m x 40 m"),
@@ -100,13 +100,11 @@ AZEVEDO2025 = Protocol(
     ),
     differences=(
         "Of the three strategies of the original only the first, view based orientation, is here; its scan is always as wide as it may be.",
-        "Not known to us, and chosen: perfect memory as the familiarity; skylines' vertical edges, 90 x 19 pixels, as views; a "
-        "view every 10 cm "
-        "of the route; steps of 10 cm; 255 of them at most, what the route and the farthest displacement take together.",
+        "Not known to us, and chosen: perfect memory as the familiarity; skylines' vertical edges, 90 x 19 pixels, as views; a view "
+        "every 10 cm of the route; steps of 10 cm; 255 of them at most, what the route and the farthest displacement take together.",
         "A walk is never lost, and counts until it is level with the route's end. Over the last 5 % only the walks that get there count.",
-        "Worlds are tussocks, grass, stones and bushes with a skyline of trees. Starts that would stand outside of them are left "
-        "out; how many is "
-        "said below the tables.",
+        "Worlds are tussocks, grass, stones and bushes with a skyline of trees. Starts that would stand outside of them are left out; "
+        "how many is said below the tables.",
     ),
     of_walk=of_walk,
     measures=measures,
@@ -119,7 +117,7 @@ AZEVEDO2025 = Protocol(
         ),
         Exhibit(
             name="last", title="Displacement over the last 5 % of the route", table="walks",
-            caption="As above, of the walks that got there.",
+            caption="As above, of the walks alone that got there.",
             draw=lambda walks: curves(walks, "start_m", "last_displacement_m", "start beside the route (m)",
             "mean displacement (m)", equal=True),
         ),

@@ -80,14 +80,13 @@ BADDELEY2012 = Protocol(
         Parameter(name="Learning", published="one pass", here="one pass"),
     ),
     differences=(
-        "How the original scales its views is not known to us, and the learning rate means nothing without it. On silhouettes of "
-        "0 and 1, and on "
-        "views of variance 1, a rate of 0.01 made the weights grow without bound. Here views have mean 0 and a standard deviation of "
-        "0.25: a view is then learned about once (0.01 times its squared length is 0.96).",
-        "Not known to us, and chosen: a view every 4 cm, steps of 4 cm, a scan of 180 degrees about the present heading, elevations from "
-        "-8 to 60 degrees, starts on the route and 10 cm to both sides.",
-        "An agent more than 0.5 m off the route, or without progress for 3 m, is put back on it at the next of its waypoints, every 10 cm, "
-        "and that is counted as an error, so that all of a route is tested.",
+        "How the original scales its views is not known to us, and the learning rate means nothing without it. On silhouettes of 0 "
+        "and 1, and on views of variance 1, a rate of 0.01 made the weights grow without bound. Here views have mean 0 and a standard "
+        "deviation of 0.25: a view is then learned about once (0.01 times its squared length is 0.96).",
+        "Not known to us, and chosen: a view every 4 cm, steps of 4 cm, a scan of 180 degrees about the present heading, elevations "
+        "from -8 to 60 degrees, starts on the route and 10 cm to both sides.",
+        "An agent more than 0.5 m off the route, or without progress for 3 m, is put back on it at the next of its waypoints, every "
+        "10 cm, and that is counted as an error, so that all of a route is tested.",
         "The most familiar rotation is refined between the 4 degrees of a column by a parabola through its neighbours.",
         "The original learns repeated and several routes as well; this is its simplest experiment, one route learned in one pass.",
     ),

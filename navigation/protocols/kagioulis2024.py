@@ -79,16 +79,12 @@ KAGIOULIS2024 = Protocol(
     ),
     differences=(
         "After a failure the agent stands 1 to 5 views ahead of the furthest place that it had reached, at the next multiple of 5 "
-        "views, where "
-        "the original puts it 5 views ahead: failures can repeat more often.",
-        "The sequence is kept by `chain` (docs/models.md): a window of 5 % of the views ahead and half as many behind, doubled "
-        "where nothing "
-        "in it matches. The original compares windows of several fixed lengths with one that adapts itself. Neither loses its place "
-        "when it is put back, except as far as the window follows.",
+        "views, where the original puts it 5 views ahead: failures can repeat more often.",
+        "The sequence is kept by `chain` (docs/models.md): a window of 5 % of the views ahead and half as many behind, doubled where "
+        "nothing in it matches. The original compares windows of several fixed lengths with one that adapts itself.",
         "Columns stand every degree, so that rotations by 1 degree need no interpolated image; blurring makes this as coarse as 180 x 40.",
-        "Not known to us, and chosen: the width of the blur (one pixel of 2 degrees), a view every 5 cm, elevations from -15 to "
-        "60 degrees, the "
-        "length of the routes, and no noise.",
+        "Not known to us, and chosen: the width of the blur (one pixel of 2 degrees), a view every 5 cm, elevations from -15 to 60 "
+        "degrees, the length of the routes, and no noise.",
     ),
     measures=measures,
     exhibits=(

@@ -1,0 +1,327 @@
+"""Published protocols: the parameters of their sweeps, their measures by hand, and one replication from the command line."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from navigation.cli import main
+from navigation.encoding import Encoding
+from navigation.models import make_model
+from navigation.protocols import ARDIN2016, AZEVEDO2025, BADDELEY2012, KAGIOULIS2024, PROTOCOLS, places
+from navigation.protocols.azevedo2025 import of_walk
+from world.errors import InputError
+from world.geometry import Route
+
+TINY = ("--quick", "--world", "tiny", "--worlds", "2")
+
+
+def runs_of(protocol, quick=False):
+    return list(protocol.sweep(places(protocol.world, [], count=protocol.worlds), quick=quick).runs())
+
+
+def values(runs, name):
+    return {getattr(run, name) for run in runs}
+
+
+def features_of(run):
+    """Columns and rows of what the models see."""
+    width, height = run.width_and_height()
+    (rows, columns), *_ = run.chosen_encoding().bounds(height, width)
+    return columns, rows
+
+
+def test_ardin_is_as_published():
+    runs = runs_of(ARDIN2016)
+    assert len(runs) == 15 * 4 * 10
+    for name, value in {
+        "spacing_m": 0.1, "step_m": 0.1, "scan_deg": 120, "lost_m": 0.2, "arrive_m": 0.2, "max_steps": 1000, "on_lost": "reset",
+        "route_length_m": 8, "learning_walk_m": 0,
+    }.items():  # fmt: skip
+        assert values(runs, name) == {value}, name
+    assert sorted(values(runs, "offset_m")) == [-0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25]
+    bodies = [make_model(model) for model in values(runs, "model") if model.startswith("mushroom-body")]
+    assert [(each.columns * each.rows, each.cells, each.inputs) for each in bodies] == [(360, 20_000, 10)]
+    assert {model.split()[0] for model in values(runs, "model")} == {
+        "perfect-memory",
+        "mushroom-body",
+        "infomax",
+        "random",
+    }
+    assert features_of(runs[0]) == (360 // 2, 10)  # a column every 2 degrees ..
+    steps = [step.word for step in runs[0].chosen_encoding().steps]
+    assert steps[:3] == ["grey", "invert", "clahe"]
+    assert runs[0].chosen_encoding().steps[-1].columns == 180 / 36  # .. each as wide as one of 36
+
+
+def test_baddeley_is_as_published():
+    runs = runs_of(BADDELEY2012)
+    assert values(runs, "size") == {"360x68"}
+    assert features_of(runs[0]) == (90, 17)
+    assert runs[0].top_deg - runs[0].bottom_deg == 68
+    (infomax,) = (make_model(model) for model in values(runs, "model") if model.startswith("infomax"))
+    assert (infomax.units, infomax.traversals) == (None, 1)  # as many as inputs; one pass
+    assert infomax.CHOICES["rate"][infomax.rate](1530, 1530) == 0.01 / 1530
+
+
+def test_azevedo_is_as_published():
+    runs = runs_of(AZEVEDO2025)
+    assert len(runs) == 75 * 45
+    assert values(runs, "route_length_m") == {20}
+    assert values(runs, "scan_deg") == {160}
+    assert len(values(runs, "world_seed")) == 75
+    offsets = sorted(values(runs, "offset_m"))
+    assert len(offsets) == 45
+    assert (offsets[0], offsets[22], offsets[-1]) == (-5.5, 0, 5.5)
+    assert runs[0].lost_m > 40 * 2**0.5  # no walk is ended for being far
+    assert runs[0].patience_m > runs[0].max_steps * runs[0].step_m
+
+
+def test_kagioulis_is_as_published():
+    runs = runs_of(KAGIOULIS2024)
+    assert len({(run.world_seed, run.route_seed) for run in runs}) == 20
+    for name, value in {"scan_deg": 360, "step_m": 0.05, "lost_m": 0.3, "on_lost": "reset"}.items():
+        assert values(runs, name) == {value}, name
+    assert runs[0].patience_m / runs[0].step_m == 10
+    assert runs[0].waypoint_m / runs[0].spacing_m == 5
+    assert features_of(runs[0]) == (360, 80)  # a column a degree ..
+    assert Encoding.parse("grey | widen 2").steps[-1] in runs[0].chosen_encoding().steps  # .. of 2 degrees, as of 180
+    assert "blur" in {step.word for step in runs[0].chosen_encoding().steps}
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=PROTOCOLS)
+def test_runs_can_be_done_and_quick_ones_are_fewer_of_the_same(protocol):
+    for run in runs_of(protocol)[:: 7 * 5]:
+        run.check()
+    whole, quick = (runs_of(protocol, quick) for quick in (False, True))
+    assert all(run in whole for run in quick)
+    assert protocol.quick_worlds < protocol.worlds
+    assert len({each.name for each in protocol.exhibits}) == len(protocol.exhibits)
+
+
+def walks(**columns):
+    """A table of walks; what is not given is alike in all."""
+    table = pd.DataFrame(columns)
+    plain = {
+        "place": "a",
+        "arrived": True,
+        "steps": 80,
+        "mean_deviation_m": 0.1,
+        "mean_error_deg": 10.0,
+        "offset_m": 0.05,
+        "resets": 0,
+    }
+    return table.assign(**{name: value for name, value in plain.items() if name not in columns})
+
+
+ARDIN_MODELS = ["perfect-memory", "mushroom-body", "infomax", "random"]
+
+
+def test_ardin_by_hand():
+    found = ARDIN2016.measures(walks(
+        model=np.repeat(ARDIN_MODELS, 4), offset_m=[0.05, -0.05, 0.25, -0.25] * 4,
+        resets=[0, 1, 1, 2, 1, 1, 2, 2, 3, 4, 5, 6, 20, 22, 24, 30], place=["a", "b"] * 8,
+    ))  # fmt: skip
+    table = found.tables["by_displacement"].set_index("model")
+    assert list(table.columns) == ["5 cm", "25 cm", "all"]
+    assert table.loc["perfect-memory"].tolist() == [0.5, 1.5, 1.0]
+    assert table.loc["random"].tolist() == [21, 27, 24]
+    assert found.tables["by_route"].set_index("model").loc["infomax"].tolist() == [4, 5, 4.5]
+    claims = {claim.key: claim for claim in found.claims}
+    assert claims["body-close"].obtained == {"share of the way from perfect memory to random": pytest.approx(0.5 / 23)}
+    assert {key: claim.holds for key, claim in claims.items()} == {
+        "random-worst": True,
+        "perfect-best": True,
+        "body-close": True,
+    }
+
+
+@pytest.mark.parametrize(
+    ("resets", "holds"),
+    [
+        ([1, 2, 9, 8], {"random-worst": False, "perfect-best": True, "body-close": False}),
+        ([2, 1, 3, 99], {"random-worst": True, "perfect-best": False, "body-close": True}),
+    ],
+)
+def test_ardins_claims_can_fail(resets, holds):
+    found = ARDIN2016.measures(walks(model=ARDIN_MODELS, resets=resets))
+    assert {claim.key: claim.holds for claim in found.claims} == holds
+
+
+def test_baddeley_by_hand():
+    models = np.repeat(["perfect-memory", "infomax", "random"], 4)
+    found = BADDELEY2012.measures(
+        walks(model=models, resets=[0, 0, 0, 0, 0, 0, 4, 2, 9, 9, 9, 9], arrived=[True] * 11 + [False])
+    )
+    table = found.tables["by_model"].set_index("model")
+    assert table["arrived without an error"].tolist() == [1, 0.5, 0]
+    assert table["errors a walk"].tolist() == [0, 1.5, 9]
+    assert table["arrived"].tolist() == [1, 1, 0.75]
+    assert table["mean deviation (cm)"].tolist() == pytest.approx([10, 10, 10])
+    assert [claim.holds for claim in found.claims] == [True, False, True]
+
+
+def test_kagioulis_by_hand():
+    models = ["perfect-memory"] * 2 + ["chain"] * 2
+    found = KAGIOULIS2024.measures(
+        walks(model=models, resets=[4, 0, 1, 2], mean_error_deg=[10.0, 20, 30, 2], place=["a", "b"] * 2)
+    )
+    table = found.tables["by_model"].set_index("model")
+    assert table["mean absolute angular error (°)"].tolist() == [15, 16]
+    assert table["trial-fail count"].tolist() == [2, 1.5]
+    assert [claim.holds for claim in found.claims] == [False, True]
+    assert found.tables["by_route"].set_index("place").loc["b", "failures, chain"] == 2
+
+
+def test_azevedos_displacement_of_a_walk_by_hand():
+    row = {"route": None, "world": "tussock-field", "route_length_m": 10.0}
+    steps = pd.DataFrame({"along_m": [0.0, 9.6, 9.8, 10.0, 10.0], "deviation_m": [4.0, 1.0, 2.0, 3.0, 99.0]})
+    found = of_walk(row, steps)  # what comes after its end does not count
+    assert found == {"displacement_m": 2.5, "last_displacement_m": 2.0}
+    short = of_walk(row, steps.iloc[:1])
+    assert short["displacement_m"] == 4
+    assert np.isnan(short["last_displacement_m"])
+
+
+def test_azevedos_route_length_is_that_of_the_route(tmp_path):
+    from navigation.protocols.protocol import route_length
+    from world.files import write_route
+    from world.scene import World
+    from world.walk import generate_route
+
+    write_route(Route.through(np.array([[0.0, 0], [3, 4]])), tmp_path / "route.csv")
+    assert route_length({"route": str(tmp_path / "route.csv")}) == pytest.approx(5)
+    for length in (2.0, 20.0):  # the second does not fit
+        route = generate_route(World.generate("tiny", seed=1), 1, length)
+        row = {"route": None, "world": "tiny", "route_length_m": length}
+        assert route_length(row) == pytest.approx(route.length, abs=0.02)
+
+
+def test_azevedo_by_hand():
+    table = walks(model="perfect-memory", offset_m=[-2.0, 2, -4, 4, 0]).assign(
+        displacement_m=[1.0, 3, 5, 7, 0.5], last_displacement_m=[1.0, np.nan, np.nan, 4, 0.5]
+    )
+    found = AZEVEDO2025.measures(table)
+    rows = found.tables["by_start"].to_numpy().tolist()
+    assert rows == [[0, 1, 0.5, 0.5, 1], [2, 2, 2, 1, 0.5], [4, 2, 6, 4, 0.5]]
+    assert found.claims[0].holds is True
+    assert found.numbers["share that got to the last 5 %"] == 0.6
+    back = AZEVEDO2025.measures(table.assign(displacement_m=[7.0, 7, 1, 1, 9]))
+    assert back.claims[0].holds is False
+
+
+@pytest.fixture(scope="module")
+def replication(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("protocols") / "kagioulis"
+    command = [
+        sys.executable,
+        "-m",
+        "navigation.cli",
+        "replicate",
+        "kagioulis2024",
+        *TINY,
+        "--workers",
+        "2",
+        "--out",
+        str(out),
+        "--json",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert (said["runs"], said["done_before"], said["could_not_run"]) == (4, 0, 0)
+    assert set(said["claims"]) == {"sequence-lowers-error", "sequence-fails-less"}
+    return out
+
+
+def test_results_are_those_of_the_runs(replication):
+    results = json.loads(
+        (replication / "results.json").read_text(), parse_constant=lambda word: pytest.fail(f"{word} is not JSON")
+    )
+    runs = pd.read_parquet(replication / "runs.parquet")
+    table = pd.DataFrame(
+        results["tables"]["by_model"]["data"], columns=results["tables"]["by_model"]["columns"]
+    ).set_index("model")
+    for model in ("perfect-memory", "chain"):
+        mean = runs[runs["model"] == model][["resets", "mean_error_deg"]].mean()
+        assert table.loc[model, "trial-fail count"] == pytest.approx(mean["resets"])
+        assert table.loc[model, "mean absolute angular error (°)"] == pytest.approx(mean["mean_error_deg"])
+    assert results["parameters"]["Step"] == {"published": "5 cm", "here": "5 cm"}
+
+
+def test_the_page_is_self_contained_and_has_everything(replication):
+    page = (replication / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
+    anchors = re.findall(r'id="([^"]+)"', page)
+    assert len(anchors) == len(set(anchors))
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(anchors)
+    assert {each.name for each in KAGIOULIS2024.exhibits} <= set(anchors)
+    assert (
+        page.index('id="summary"')
+        < page.index('id="results"')
+        < page.index('id="differences"')
+        < page.index('id="again"')
+    )
+    drawn = [each.name for each in KAGIOULIS2024.exhibits if each.draw]
+    assert page.count("data:image/png;base64,") == len(drawn)
+    files = sorted(f"{name}.{kind}" for name in drawn for kind in ("png", "svg"))
+    assert sorted(path.name for path in (replication / "figures").iterdir()) == files
+    assert "tussock replicate kagioulis2024 --world tiny --worlds 2 --quick --out" in page
+
+
+def test_a_second_time_does_nothing_anew_and_changes_no_byte(replication, capsys):
+    names = ("report.html", "results.json", "runs.parquet")
+    before = {name: (replication / name).read_bytes() for name in names}
+    main(["replicate", "kagioulis2024", *TINY, "--out", str(replication), "--json"])
+    assert json.loads(capsys.readouterr().out)["done_before"] == 4
+    assert {name: (replication / name).read_bytes() for name in names} == before
+
+
+def test_a_report_of_something_else_is_not_replaced(replication, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["replicate", "kagioulis2024", *TINY, "--seed", "3", "--out", str(replication)])
+    assert end.value.code == 2
+    assert "holds a report of something else (Routes)" in capsys.readouterr().err
+
+
+def test_given_routes_through_a_given_world():
+    chosen = places("world.bin", [Path("a.csv"), Path("b.csv")], seed=2)
+    assert [choice["route"].name for choice in chosen] == ["a.csv", "b.csv"]
+    generated = places("tiny", [], seed=2, count=3)
+    assert [(choice["world_seed"], choice["route_seed"]) for choice in generated] == [(2, 2), (3, 3), (4, 4)]
+    assert [choice["route_seed"] for choice in places("world.bin", [], seed=2, count=2)] == [2, 3]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--route a.csv", "give --world as well"),
+        ("--world tiny --route a.csv --worlds 2", "give it, or --route"),
+        ("--worlds 0", "give at least 1"),
+        ("--workers 0", "give at least 1"),
+        ("--workers 1 --scheduler tcp://127.0.0.1:1", "give one of the two"),
+        ("--world tiny --route nowhere.csv", "there is no route nowhere.csv"),
+        ("--world nowhere.bin", "there is no world 'nowhere.bin'"),
+        ("--world 'tiny field_width=0'", "field_width"),
+    ],
+)
+def test_bad_input_is_one_line(words, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(["replicate", "ardin2016", *shlex.split(words)])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err.strip().splitlines()[-1]
+    assert not (tmp_path / "ardin2016").exists()
+
+
+def test_a_model_that_never_walked_is_no_verdict():
+    from navigation.protocols.protocol import check_walked
+
+    with pytest.raises(InputError, match="no walk with random could be made"):
+        check_walked(walks(model=["chain"]), ["chain", "random"])
