@@ -25,7 +25,7 @@ HERE = Path(__file__).parent
 GENEROUS = 600  # seconds; only what hangs takes so long
 
 
-@pytest.mark.parametrize("file", ["fuzz_files", "fuzz_databases", "fuzz_models", "fuzz_numbers"])
+@pytest.mark.parametrize("file", ["fuzz_files", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"])
 def test_anything_is_used_or_refused(file):
     paths = os.pathsep.join([str(HERE.parent), str(HERE), os.environ.get("PYTHONPATH", "")])
     run = subprocess.run(
