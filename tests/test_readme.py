@@ -21,6 +21,8 @@ def folder(tmp_path_factory):
 def test_the_commands(folder):
     commands = re.findall(r"^    (tussock .+)$", README, flags=re.MULTILINE)
     assert len(commands) >= 5
+    (sweep,) = re.findall(r"```toml\n(.+?)```", README, flags=re.DOTALL)
+    (folder / "sweep.toml").write_text(sweep)
     for command in commands:
         words = shlex.split(command)[1:]
         if words[0] == "play":
