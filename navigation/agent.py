@@ -15,7 +15,18 @@ from world.geometry import Pose, Route, columns_of_turn, wrap_angle
 from .encoding import Encoding
 from .familiarity import FamiliarityModel, SequenceModel, SnapshotModel
 from .rotation import best_turn, scan_window
-from .rules import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Progress, Rules, check_distance, check_limits
+from .rules import (
+    ARRIVED,
+    LOST,
+    OUT_OF_STEPS,
+    OUT_OF_WORLD,
+    STUCK,
+    Progress,
+    Rules,
+    check_distance,
+    check_limits,
+    check_noise,
+)
 from .threads import OneTorchThread
 
 __all__ = ["ARRIVED", "LOST", "OUT_OF_STEPS", "OUT_OF_WORLD", "STUCK", "Agent", "Step"]
@@ -80,8 +91,7 @@ class AgentSettings:
     def __post_init__(self):
         check_distance("waypoint_spacing", self.waypoint_spacing)
         check_limits(self)
-        if not (np.isfinite(self.heading_noise) and self.heading_noise >= 0):
-            raise InputError(f"heading noise {np.degrees(self.heading_noise):g} degrees; give 0 or more")
+        check_noise(self.heading_noise)
         scan_window(4, self.scan)  # refuses what is no angle
         if self.scan_about is not None and not np.isfinite(self.scan_about):
             raise InputError(

@@ -12,6 +12,7 @@ import tyro
 
 from world.errors import InputError
 
+from .benchmark_commands import BenchmarkCommand
 from .database_commands import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
 from .learning_commands import (
     CompareCommand,
@@ -40,6 +41,7 @@ COMMANDS: dict[str, Any] = {
     "play": PlayCommand,
     "sweep": SweepCommand,
     "report": ReportCommand,
+    "benchmark": BenchmarkCommand,
     "replicate": (
         "Re-run a published study and write a report to read beside it.",
         {"thesis": ThesisCommand} | REPLICATIONS,

@@ -78,7 +78,7 @@ class TrainCommand(LearningOptions):
 
         from world.files import check_writable
 
-        from .familiarity import IncrementalModel
+        from .familiarity import IncrementalModel, Model
         from .model_files import save_model
         from .training import training_views
 
@@ -87,6 +87,7 @@ class TrainCommand(LearningOptions):
         check_writable(self.out)
         lesson = self.prepare()
         model, saved = lesson.model, lesson.saved
+        assert isinstance(model, Model)
         if saved is None:
             learn = model.fit
         elif isinstance(model, IncrementalModel):

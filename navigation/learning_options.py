@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from .agent import Agent, AgentSettings
     from .encoding import Encoding
-    from .familiarity import Model
+    from .familiarity import FamiliarityModel
     from .model_files import SavedModel
 
 FILE_SUFFIX = ".safetensors"  # of trained models
@@ -190,7 +190,7 @@ class Lesson:
     route_views: "Route"
     poses: "np.ndarray"
     encoding: "Encoding"
-    model: "Model"
+    model: "FamiliarityModel"
     saved: "SavedModel | None"
 
     def teach(

@@ -70,6 +70,12 @@ def check_distance(name: str, value: float) -> None:
         raise InputError(f"{name.replace('_', ' ')} {value} m; give a finite distance over 0")
 
 
+def check_noise(noise: float) -> None:
+    """Refuse what is no standard deviation of headings (rad). Raises InputError."""
+    if not (np.isfinite(noise) and noise >= 0):
+        raise InputError(f"heading noise {np.degrees(noise):g} degrees; give 0 or more")
+
+
 class Progress:
     """How far one walk has come.
 

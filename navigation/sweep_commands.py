@@ -35,10 +35,7 @@ class SweepCommand:
         record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
         if record is None:
             raise InputError(f"--record {self.record!r}: give worst:5, or another number")
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"--workers {self.workers}: give at least 1")
-        if self.scheduler is not None and self.workers is not None:
-            raise InputError("--workers are those on this machine; a scheduler has its own: give one of the two")
+        check_workers(self.scheduler, self.workers)
         sweep = read_sweep(self.sweep)
 
         from .sweeps.sweep import run_sweep
@@ -72,3 +69,11 @@ class ReportCommand:
             "report": str(self.folder / REPORT), "results": str(self.folder / RESULTS), "runs": results["runs"],
             "could_not_run": len(results["could_not_run"]),
         } | {measure: found["value"] for measure, found in results["measures"].items()}  # fmt: skip
+
+
+def check_workers(scheduler: str | None, workers: int | None) -> None:
+    """Refuse flags that say twice, or wrongly, who does the runs. Raises InputError."""
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: give at least 1")
+    if scheduler is not None and workers is not None:
+        raise InputError("--workers are those on this machine; a scheduler has its own: give one of the two")

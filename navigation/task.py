@@ -20,7 +20,7 @@ from world.scene import World
 from world.walk import check_route, generate_route
 
 from .encoding import Encoding
-from .rules import ARRIVED, OUT_OF_STEPS, Progress, Rules
+from .rules import ARRIVED, OUT_OF_STEPS, Progress, Rules, check_noise
 from .training import training_poses, training_views
 
 EYE = Eye(width=90, height=25)  # a pixel is 4 degrees wide and 3 high
@@ -47,6 +47,7 @@ class RouteTask:
     route: a route, or its file; None generates one of `length` (m). eye: through which the learner sees.
     encoding: of what it sees, a name or a chain (see `Encoding.named`); None leaves the panorama as it is.
     renderer: "auto", "cpu", "egl" or "osmesa". offset: walks start up to this far to either side of the route's start (m).
+    heading_noise: standard deviation of the normal noise on every turn (rad), drawn from the walk's generator as an `Agent` draws it.
     step_length: of the longest step (m). arrive, lost, patience, max_steps: when a walk ends; as for an `Agent`.
     """
 
@@ -59,6 +60,7 @@ class RouteTask:
     encoding: Encoding | str | None = None
     renderer: str = "auto"
     offset: float = 0.1
+    heading_noise: float = 0.0
     step_length: float = 0.05
     arrive: float = 0.15
     lost: float = 0.5
@@ -75,6 +77,7 @@ class RouteTask:
             raise InputError(
                 f"an offset of {self.offset} m; give 0 or more, and less than {self.lost} m, which is lost"
             )
+        check_noise(self.heading_noise)
         _ = self.chain  # refuses what is no encoding
 
     @cached_property
@@ -147,7 +150,7 @@ class Walk:
         self.reason: str | None = "not begun"
 
     def begin(self, random: np.random.Generator, options: Mapping[str, Any] | None) -> dict[str, Any]:
-        """Set out, and return the info of the first look. What `options` leave open is drawn.
+        """Set out, and return the info of the first look. What `options` leave open is drawn, and then the noise of the walk.
 
         options: world: the seed of one of the task's worlds. start: x (m), y (m), heading (rad).
         Raises InputError for others, and where the walk would be over before it has begun.
@@ -169,6 +172,7 @@ class Walk:
         pose = Pose(*(float(number) for number in start))
         rules.check_inside(pose)
         self.seed, self.rules, self.pose, self.index, self.progress = int(seed), rules, pose, 0, Progress(rules)
+        self.random = random
         info = self._look()
         if self.reason is not None:
             raise InputError(f"a walk that starts at {tuple(self.pose)} is {self.reason} at once; choose another start")
@@ -182,7 +186,10 @@ class Walk:
         if values.shape != (2,) or not (-1 <= values[0] <= 1 and 0 <= values[1] <= 1):
             raise InputError(f"action {values.tolist()}; give a turn from -1 to 1 and a step from 0 to 1")
         turn, share = values.tolist()
-        self.pose = self.pose.turned(turn * np.pi).moved(share * self.rules.step_length)
+        turn *= np.pi
+        if self.task.heading_noise:
+            turn += self.task.heading_noise * self.random.standard_normal()
+        self.pose = self.pose.turned(turn).moved(share * self.rules.step_length)
         self.progress.step(share)
         self.index += 1
         before = self.along

@@ -90,7 +90,9 @@ class _Pace:
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print a result for people: a line a value, a line each where a value is a list, a table where the rows have names."""
+    """Print a result for people: a line a value, a line each where a value is a list, a table where the rows have names, and a text
+    of several lines as it stands.
+    """
     width = max(map(len, result))
     for key, value in result.items():
         if isinstance(value, dict) and any(isinstance(row, dict) for row in value.values()):
@@ -100,6 +102,8 @@ def show(result: dict[str, Any]) -> None:
         elif isinstance(value, list):
             for row in value:
                 print("  ".join(map(text, row.values())) if isinstance(row, dict) else f"{key:<{width}}  {text(row)}")
+        elif isinstance(value, str) and "\n" in value:
+            print(value)
         else:
             print(f"{key:<{width}}  {text(value)}")
 

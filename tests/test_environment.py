@@ -106,7 +106,9 @@ def test_a_familiarity_model_walks_here_as_its_agent_does(made):
 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
-@pytest.mark.parametrize("settings", [{}, {"encoding": "edges"}, {"world": "tiny", "worlds": 3}])
+@pytest.mark.parametrize(
+    "settings", [{}, {"encoding": "edges"}, {"world": "tiny", "worlds": 3}, {"heading_noise": 0.3}]
+)
 def test_side_by_side_they_walk_as_alone(made, mode, settings):
     """Held, to the last bit, against Gymnasium's own vector environment, which steps one after the other."""
     settings = {"lost": 0.15, "max_steps": 9} | settings
@@ -296,6 +298,7 @@ def test_frames_are_what_is_seen_enlarged(made):
         ({"route": STRAIGHT, "offset": 1.6, "lost": 2.0}, "outside the world"),
         ({"route": Route.through(np.array([[1.0, 1.0], [9.0, 1.0]]))}, "leaves the world"),
         ({"step_length": 0.0}, "step length 0.0 m"),
+        ({"heading_noise": -0.1}, "heading noise"),
         ({"max_steps": 0}, "at least 1"),
         ({"render_mode": "human"}, "render mode 'human'"),
     ],

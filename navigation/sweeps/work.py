@@ -16,12 +16,13 @@ from world.params import is_generated
 from world.scene import World
 
 from ..failures import CAUSES, Witness
+from ..familiarity import FamiliarityModel
 from ..learning_options import LearningOptions, Lesson, RunOptions
 from ..options import PathOptions
 from ..threads import use_threads
 from ..trajectory import Trajectory
 
-VERSION = 1  # of what a run does: a change that alters what comes of one counts it up, and what was kept is done again
+VERSION = 2  # of what a run does: a change that alters what comes of one counts it up, and what was kept is done again
 _NOT_OF_PATH = {"size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg"}  # the eye's
 
 
@@ -56,10 +57,12 @@ def open_path(options: RunOptions) -> tuple[World, Route]:
     return options.open_route()
 
 
-def teach(options: RunOptions, path: tuple[World, Route]) -> Taught:
-    """What a run's model learns before the walk."""
+def teach(options: RunOptions, path: tuple[World, Route], model: FamiliarityModel | None = None) -> Taught:
+    """What a run's model learns before the walk. model: an untrained one to take instead of the one that the options name."""
     began = time.perf_counter()
     lesson = options.prepare(path)
+    if model is not None:
+        lesson = dataclasses.replace(lesson, model=model)
     renderer = open_renderer(lesson.world, options.eye(), options.renderer, threads=options.threads)
     poses = lesson.teach(renderer)
     witness = Witness(renderer, lesson.encoding, lesson.route, poses)
@@ -76,6 +79,7 @@ def walk(options: RunOptions, taught: Taught) -> Walked:
     for step in agent.walk(agent.start(options.offset_m)):
         trajectory.add(step, taught.witness.evidence(step))
     found: dict[str, Any] = trajectory.summary() | {"n_views": taught.n_views}
+    found["memory_bytes"] = getattr(taught.lesson.model, "memory_bytes", None)
     causes = found.pop("causes")
     found |= {f"{label.replace(' ', '_')}_steps": causes.get(label, 0) for label in CAUSES}
     seconds = time.perf_counter() - began

@@ -1,0 +1,344 @@
+"""The test bed: it stays what its name says, results repeat to the byte, and whoever enters by another door gets the same."""
+
+import dataclasses
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from navigation.benchmark.definition import BENCHMARK, BENCHMARKS, QUICK, SETTINGS, Benchmark
+from navigation.benchmark.leaderboard import leaderboard, read_results
+from navigation.benchmark.learners import enter_learner, tasks
+from navigation.benchmark.models import enter, enter_named
+from navigation.benchmark.results import Result, interval_over_worlds, read_result, score
+from navigation.benchmark_commands import BenchmarkCommand
+from navigation.cli import main
+from navigation.learning_options import RunOptions
+from navigation.models import PerfectMemory, make_model
+from navigation.rotation import best_turn, scan_window
+from navigation.sweeps.work import teach, walk
+from world.errors import InputError
+
+ROOT = Path(__file__).parents[1]
+MEASURED, PAGE = ROOT / "docs" / "benchmark", ROOT / "docs" / "benchmark.md"
+
+# Stands in for the test bed: one tiny world.
+TINY = Benchmark(
+    name="tiny-1", worlds=(("tiny", 3),), noises_deg=(0.0, 20.0), displacements_m=(-0.1, 0.2),
+    settings={**SETTINGS, "size": "60x16", "spacing_m": 0.1},
+)  # fmt: skip
+WHAT_IT_IS = {
+    "tussock-1": "71c2f5d9b5c3f8504a8a885bacb00cdd88cd308d88832c1fb1288d99e0823757",
+    "tussock-1-quick": "ad70ca16e4ff30954f4428cbdf4f993e16f8b7c8eae10edd59f8c47696666f72",
+}
+
+
+@pytest.fixture(scope="module")
+def entered(tmp_path_factory) -> tuple[Result, Path]:
+    """Perfect memory, as the command enters it."""
+    return enter_named("perfect-memory", tmp_path_factory.mktemp("entered"), benchmark=TINY, workers=1)
+
+
+def line(
+    world: str = "tiny",
+    seed: int = 0,
+    noise: float = 0.0,
+    offset: float = 0.0,
+    deviation: float = 0.1,
+    *,
+    arrived: bool = True,
+):
+    """Of a run that arrived, or of one that was lost."""
+    return {
+        "world": world, "seed": seed, "heading_noise_deg": noise, "offset_m": offset, "arrived": arrived,
+        "reason": "arrived" if arrived else "lost", "steps": 9, "mean_deviation_m": deviation, "max_deviation_m": deviation,
+        "poor_steps": 0, "cause": None if arrived else "aliasing", "error": None,
+    }  # fmt: skip
+
+
+def made_up(entry: str, *lines, **said) -> Result:
+    return Result(
+        **{
+            "benchmark": "made-up-1", "entry": entry, "encoding": "sky-mask", "tussock": "0", "runs": list(lines),
+            "memory_bytes": 1_500_000, "times": {},
+        }
+        | said
+    )  # fmt: skip
+
+
+# What it is
+
+
+@pytest.mark.parametrize("name", BENCHMARKS)
+def test_nothing_in_it_changes_unnoticed(name):
+    """Whoever changes what is asked gives it a new name, and does not mend the digest under the old one."""
+    assert BENCHMARKS[name].digest() == WHAT_IT_IS[name]
+
+
+def test_its_digest_tells_everything_in_it_apart():
+    changes = [
+        {"worlds": (("tiny", 4),)},
+        {"noises_deg": (0.0, 21.0)},
+        {"displacements_m": (-0.1, 0.1)},
+        {"settings": {**TINY.settings, "arrive_m": 0.2}},
+        {"worlds": (("tiny grass_density=15", 3),)},
+    ]
+    digests = {dataclasses.replace(TINY, **change).digest() for change in [{}, *changes]}
+    assert len(digests) == 1 + len(changes)
+
+
+def test_no_default_of_a_run_is_relied_on():
+    sweep = BENCHMARK.sweep("random")
+    said = set(sweep.fixed).union(*(choices[0] for choices in sweep.axes.values()))
+    assert said == {each.name for each in dataclasses.fields(RunOptions)}
+
+
+def test_its_runs_are_all_combinations_and_each_is_sound():
+    assert BENCHMARK.name == "tussock-1"
+    runs = list(BENCHMARK.sweep("random").runs())
+    told_apart = {(run.world, run.seed, run.heading_noise_deg, run.offset_m) for run in runs}
+    assert len(told_apart) == len(runs) == len(BENCHMARK)
+    assert {run.world for run in runs} == {"tussock-field", "meadow", "scrub"}
+    assert all(run.seed >= 1000 for run in runs)
+    for run in runs:
+        run.check()
+    assert len(QUICK) < len(BENCHMARK) / 5
+
+
+# Results
+
+
+def test_a_result_says_what_came_of_it(entered):
+    result, path = entered
+    said = json.loads(path.read_text())
+    assert path.name == "perfect-memory.json"
+    assert (said["benchmark"], said["entry"]) == ("tiny-1", "perfect-memory")
+    assert said["encoding"] == "sky-mask | vertical-edges | normalise"
+    assert said["memory_bytes"] > 0
+    assert set(said["times"]) == {"learn_seconds", "walk_seconds"}
+    asked = [(noise, offset) for noise in TINY.noises_deg for offset in TINY.displacements_m]
+    assert [(run["heading_noise_deg"], run["offset_m"]) for run in said["runs"]] == asked
+    arrived = [run["arrived"] for run in said["runs"]]
+    assert said["totals"]["runs"] == 4
+    assert said["totals"]["arrived"] == sum(arrived)
+    assert said["by_noise_deg"]["20"]["arrived"] == sum(arrived[2:])
+    assert said["by_displacement_m"]["-0.1"]["arrived"] == arrived[0] + arrived[2]
+    assert list(said["by_preset"]) == ["tiny"]
+    assert read_result(path, {TINY.name: TINY}) == result
+
+
+def test_a_second_time_gives_the_same_bytes_but_for_the_times(entered, tmp_path):
+    def without_times(path):
+        return re.sub(r'"times": \{[^}]*\}', "", path.read_text())
+
+    _, again = enter_named("perfect-memory", tmp_path, benchmark=TINY, workers=2)
+    assert without_times(again) == without_times(entered[1])
+    before = again.read_bytes()
+    enter_named("perfect-memory ", tmp_path, benchmark=TINY)  # every run is kept: nothing is left to be done
+    assert again.read_bytes() == before
+
+
+def test_a_model_from_python_gets_what_the_command_gives_it(entered, tmp_path):
+    class Foreign:
+        """No model of the project's, only one by what it does."""
+
+        def __init__(self, seed):
+            assert seed == 3
+
+        def fit(self, views):
+            self.memory = PerfectMemory().fit(views)
+            return self
+
+        def scan(self, views):
+            return self.memory.scan(views)
+
+    named, _ = entered
+    foreign, path = enter(Foreign, "my memory", tmp_path, benchmark=TINY)
+    assert path.name == "my-memory.json"
+    assert foreign.memory_bytes is None
+    assert list(foreign.runs) == list(named.runs)
+    own, _ = enter(lambda seed: make_model("perfect-memory", seed=seed), "own", tmp_path, benchmark=TINY)
+    assert own.memory_bytes == named.memory_bytes
+    assert own.scores() == named.scores()
+
+
+def test_a_learner_gets_what_the_command_gives_it(entered, tmp_path):
+    """The same model behind the environment: the same starts and, for the runs that have some, the same noise."""
+    looks = []
+
+    def learn(env):
+        views, _ = env.training_views(learning_walk=0.2, spacing=0.1)
+        memory = PerfectMemory().fit(torch.from_numpy(views))
+
+        def act(observation, look):
+            looks.append(look)
+            familiarity = memory.scan(torch.from_numpy(observation)[None]).numpy()
+            return np.array([best_turn(familiarity, scan_window(60, np.pi))[0] / np.pi, 1.0])
+
+        return act
+
+    named, _ = entered
+    learner, _ = enter_learner(learn, "learner", tmp_path, benchmark=TINY)
+    assert looks.count(0) == len(TINY)
+    unknown = {"poor_steps": None, "cause": None}
+    assert len({run["steps"] for run in named.runs}) > 1
+    for run, other in zip(named.runs, learner.runs, strict=True):
+        for name in ("mean_deviation_m", "max_deviation_m"):
+            assert np.isclose(
+                run[name], other[name], rtol=0, atol=1e-9
+            )  # a turn comes as a share of half a turn: rounding
+            other = other | {name: run[name]}
+        assert other == run | unknown
+    assert learner.encoding == named.encoding
+    assert learner.scores()["totals"]["poor_steps"] is None
+
+
+def test_a_learner_may_see_the_panorama(tmp_path):
+    def learn(env):
+        assert env.observation_space.shape == (16, 60, 3)
+        return lambda observation, look: np.array([0.0, 1.0])
+
+    result, path = enter_learner(learn, "ahead", tmp_path, encoding=None, benchmark=TINY)
+    assert path.name == "ahead-panorama.json"
+    assert result.encoding == "panorama"
+    assert len({id(task.settings) for task in tasks(TINY)}) == 2
+
+
+def test_who_cannot_run_has_not_arrived(tmp_path):
+    result, _ = enter_named("infomax rate=1e6", tmp_path, benchmark=TINY, workers=1)
+    totals = result.scores()["totals"]
+    assert (totals["arrived"], totals["could_not_run"], totals["mean_deviation_m"]) == (0, 4, None)
+    assert "diverge" in result.runs[0]["error"] or "weights" in result.runs[0]["error"]
+    assert result.memory_bytes is None
+
+
+def test_shares_and_deviations_are_of_who_arrived():
+    lines = [line(deviation=0.1), line(deviation=0.3), line(deviation=5.0, arrived=False), line(deviation=0.2)]
+    assert score(lines) == {"runs": 4, "arrived": 3, "arrived_share": 0.75, "mean_deviation_m": pytest.approx(0.2)}
+    totals = made_up("it", *lines).scores()["totals"]
+    assert (totals["reasons"], totals["causes"]) == ({"lost": 1}, {"aliasing": 1})
+
+
+def test_the_interval_is_over_worlds_not_over_runs():
+    alike = [line(seed=seed, offset=offset, arrived=offset > 0) for seed in range(9) for offset in (0.1, -0.1)]
+    assert interval_over_worlds(alike) == [0.5, 0.5]  # every world has the same share
+    either = [line(seed=seed, offset=offset, arrived=seed % 2 == 0) for seed in range(100) for offset in (0.1, -0.1)]
+    low, high = interval_over_worlds(either)
+    # of a hundred worlds, as a binomial's normal approximation has it; 200 independent runs would give 0.43 and 0.57
+    assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)
+    assert high == pytest.approx(0.5 + 1.96 * 0.05, abs=0.015)
+
+
+# What is refused
+
+
+def test_results_of_another_version_are_not_replaced(entered, tmp_path):
+    path = Path(shutil.copy(entered[1], tmp_path))
+    before = path.read_bytes()
+    for other in (dataclasses.replace(TINY, name="tiny-2"), dataclasses.replace(TINY, name="tiny-1-quick")):
+        with pytest.raises(InputError, match=r"holds a result of tiny-1 .+ give another --out"):
+            enter_named("perfect-memory", tmp_path, benchmark=other)
+        with pytest.raises(InputError, match="holds a result of tiny-1 "):
+            enter(lambda seed: make_model("random", seed=seed), "Perfect memory", tmp_path, benchmark=other)
+    with pytest.raises(InputError, match="Perfect memory"):  # another entry, whose file would have this name
+        enter(lambda seed: make_model("random", seed=seed), "Perfect memory", tmp_path, benchmark=TINY)
+    assert path.read_bytes() == before
+
+
+def test_what_is_no_result_is_refused(entered, tmp_path):
+    text = entered[1].read_text()
+    for bad, match in [
+        ("{}", "no result"), ("[1]", "no result"), (text[:-9], "no result"),
+        (text.replace('"arrived": true', '"arrived": false', 1), "do not follow"),
+    ]:  # fmt: skip
+        (tmp_path / "bad.json").write_text(bad)
+        with pytest.raises(InputError, match=match) as refused:
+            read_result(tmp_path / "bad.json")
+        assert "\n" not in str(refused.value)
+    with pytest.raises(InputError, match="not the 4 of tiny-1"):
+        read_result(entered[1], {TINY.name: dataclasses.replace(TINY, noises_deg=(0.0, 10.0))})
+
+
+@pytest.mark.parametrize(
+    ("flags", "match"),
+    [
+        ({}, "give --model"),
+        ({"model": "random", "leaderboard": Path("x")}, "give --model"),
+        ({"model": "telepathy"}, "unknown model"),
+        ({"model": "memory.safetensors"}, "anew"),
+        ({"model": "random", "encoding": "colour"}, "unknown encoding"),
+        ({"model": "random", "workers": 0}, "at least 1"),
+        ({"leaderboard": Path("nowhere")}, "holds no results"),
+    ],
+)
+def test_flags_that_make_no_sense_are_refused(tmp_path, flags, match):
+    with pytest.raises(InputError, match=match):
+        BenchmarkCommand(out=tmp_path / "out", **flags).run()
+    assert not (tmp_path / "out").exists()
+
+
+# The leaderboard
+
+
+def test_the_best_come_first():
+    half = [line(deviation=0.1), line(arrived=False)]
+    entries = [
+        made_up("worse", *[line(arrived=False)] * 2, memory_bytes=None),
+        made_up("farther off", line(deviation=0.3), line(deviation=0.1)),
+        made_up("half", *half),
+        made_up("nearer", line(deviation=0.1), line(deviation=0.2)),
+    ]
+    rows = leaderboard(entries).splitlines()
+    assert rows[0] == "| entry | arrived | 95 % | off the route | noise 0 | tiny | memory |"
+    assert [row.split("`")[1] for row in rows[2:]] == ["nearer", "farther off", "half", "worse"]
+    assert rows[2] == "| `nearer`, `sky-mask` | 100 % | 100 % to 100 % | 15.0 cm | 100 % | 100 % | 1.5 MB |"
+    assert rows[5] == "| `worse`, `sky-mask` | 0 % | 0 % to 0 % |  | 0 % | 0 % |  |"
+
+
+def test_versions_are_not_mixed(tmp_path):
+    for name in ("one-1", "one-2"):
+        (tmp_path / f"{name}.json").write_text(made_up("it", line(), benchmark=name).to_json())
+    with pytest.raises(InputError, match="one-1 and one-2, which do not compare"):
+        read_results(tmp_path)
+
+
+def test_the_page_has_the_table_of_the_results_beside_it():
+    results = read_results(MEASURED)
+    assert {result.benchmark for result in results} == {BENCHMARK.name}
+    assert leaderboard(results) in PAGE.read_text()
+    assert {"perfect-memory", "infomax", "visual-compass", "random"} <= {result.entry for result in results}
+
+
+def test_the_command_prints_it(capsys):
+    main(["benchmark", "--leaderboard", str(MEASURED)])
+    assert capsys.readouterr().out.strip() == leaderboard(read_results(MEASURED)).strip()
+
+
+def test_what_was_measured_comes_out_again():
+    """To a centimetre: another processor may round otherwise, and a walk of 160 steps goes on from there."""
+    measured = read_result(MEASURED / "perfect-memory.json")
+    run = next(BENCHMARK.by_world())[1]
+    then = measured.runs[1]
+    assert (run.world, run.seed, run.heading_noise_deg, run.offset_m) == ("tussock-field", 1000, 0.0, 0.0)
+    taught = teach(run, run.open_route())
+    with taught.renderer:
+        now = walk(run, taught).found
+    assert now["arrived"] == then["arrived"]
+    assert now["mean_deviation_m"] == pytest.approx(then["mean_deviation_m"], abs=0.01)
+
+
+def test_what_the_page_tells_people_to_type_works(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("navigation.benchmark.QUICK", TINY)
+    examples = re.findall(r"```python\n(.+?)```", PAGE.read_text(), flags=re.DOTALL)
+    names = set()
+    for example in examples:
+        here: dict = {}
+        exec(example, here)
+        names.add(here["path"].name)
+    assert names == {"mean-view.json", "memory-in-the-environment.json"}
+    assert len(read_results(tmp_path / "quick")) == 2
