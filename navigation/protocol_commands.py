@@ -10,6 +10,7 @@ import tyro
 from world.errors import InputError
 
 from .options import WORLD, words_of
+from .sweep_commands import check_workers
 from .terminal import progress, say
 
 if TYPE_CHECKING:
@@ -71,10 +72,7 @@ class ProtocolCommand:
             raise InputError("--worlds are those of generated routes; give it, or --route")
         if self.route and self.world is None:
             raise InputError("--route leads through a world; give --world as well")
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"--workers {self.workers}: give at least 1")
-        if self.scheduler is not None and self.workers is not None:
-            raise InputError("--workers are those on this machine; a scheduler has its own: give one of the two")
+        check_workers(self.scheduler, self.workers)
 
     def routes(self) -> list[Path]:
         """The route files that were given."""
