@@ -310,7 +310,9 @@ def test_the_page_has_the_table_of_the_results_beside_it():
     results = read_results(MEASURED)
     assert {result.benchmark for result in results} == {BENCHMARK.name}
     assert leaderboard(results) in PAGE.read_text()
-    assert {"perfect-memory", "infomax", "visual-compass", "random"} <= {result.entry for result in results}
+    assert {"perfect-memory", "infomax", "mushroom-body", "visual-compass", "random"} <= {
+        result.entry for result in results
+    }
 
 
 def test_the_command_prints_it(capsys):

@@ -252,19 +252,6 @@ def test_a_full_disk_is_said_and_with_room_the_sweep_goes_on(small_disk, tmp_pat
     assert sorted(table(out)["seed"]) == list(range(30))
 
 
-def test_a_run_on_a_full_disk_says_so_and_leaves_no_summary(small_disk):
-    run = [TUSSOCK, "run", "--world", "tiny", "--size", "120x25", "--seed", "2", "--out", str(small_disk / "run")]
-    done = subprocess.run(run, capture_output=True, text=True)
-    assert done.returncode == 2
-    assert "make room" in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
-    assert not (small_disk / "run" / "summary.json").exists()
-    assert "--overwrite" in (small_disk / "run" / "UNFINISHED.txt").read_text()
-    subprocess.run(["mount", "-o", "remount,size=20m", small_disk], check=True)
-    assert subprocess.run([*run, "--overwrite"], capture_output=True).returncode == 0
-    assert not (small_disk / "run" / "UNFINISHED.txt").exists()
-
-
 def test_a_run_that_cannot_be_done_is_a_row_that_says_why(tmp_path):
     path = written(tmp_path, HEAD + "[axes]\noffset-m = [0, 40.0]\n")
     assert sweep(path, tmp_path / "out")["could_not_run"] == 1

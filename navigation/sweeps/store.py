@@ -109,10 +109,16 @@ def _unusable(path: Path, error: sqlite3.Error) -> InputError:
 
 def table_of(rows: dict[str, dict[str, Any]]) -> pd.DataFrame:
     """A row a run, in an order and with types that depend on the runs alone."""
-    table = pd.DataFrame([{"key": key} | row for key, row in sorted(rows.items(), key=_in_order)])
-    table = table.convert_dtypes(convert_floating=False)  # numbers stay whole where some are missing
-    empty = table.columns[table.isna().all().to_numpy()]
-    return table.astype(dict.fromkeys(empty, "string"))
+    table = pd.DataFrame([{"key": key} | row for key, row in sorted(rows.items(), key=_in_order)], dtype=object)
+    return table.astype({name: _type_of(values) for name, values in table.items()})
+
+
+def _type_of(values: pd.Series) -> str:
+    """The type of a column in which some values may be missing: whole numbers stay whole."""
+    kinds = {type(value) for value in values if not pd.isna(value)}
+    if kinds <= {str}:
+        return "string"
+    return "boolean" if kinds == {bool} else "Int64" if kinds == {int} else "float64"
 
 
 def write_table(table: pd.DataFrame, folder: Path) -> Path:

@@ -9,7 +9,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from distributed import Client, LocalCluster, as_completed
+from distributed import CancelledError, Client, LocalCluster, as_completed
+from distributed.comm.core import CommClosedError
 
 from world.errors import InputError
 
@@ -110,12 +111,13 @@ def _finished(client: Client, missing: dict[str, RunOptions]) -> Iterator[list[t
     while left:
         results = []
         for future in waiting.next_batch(block=True):
-            if future.status in ("cancelled", "lost"):
+            try:
+                error = future.exception()
+                results.append((futures.pop(future), future.result() if error is None else error))
+            except (CancelledError, CommClosedError) as gone:
                 raise InputError(
                     "the scheduler is gone; all runs that were finished are kept: give the same command again"
-                )
-            error = future.exception() if future.status == "error" else None
-            results.append((futures.pop(future), future.result() if error is None else error))
+                ) from gone
             future.release()
         left -= len(results)
         yield results
