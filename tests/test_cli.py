@@ -389,7 +389,7 @@ def test_an_interrupted_walk_leaves_its_recording_and_trajectory(tmp_path, end, 
         process.send_signal(end)
         process.communicate()
     assert process.returncode == code
-    assert files(tmp_path / "run") == {"recording.rrd", "trajectory.csv"}
+    assert files(tmp_path / "run") == {"recording.rrd", "trajectory.csv", "UNFINISHED.txt"}
     assert len((tmp_path / "run" / "trajectory.csv").read_text().splitlines()) > 2
 
 

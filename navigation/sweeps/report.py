@@ -34,8 +34,11 @@ def write_sweep_report(
 ) -> dict[str, Any]:
     """Write report.html, report.json and the figures of a sweep into its folder; return report.json's content.
 
-    worst: how many of the worst walks are shown. A sweep may go on meanwhile. Raises InputError where the folder holds no finished run.
+    worst: how many of the worst walks are shown. A sweep may go on meanwhile. Raises InputError where the folder holds no
+    finished run, or a replication.
     """
+    if (folder / "results.json").exists():
+        raise InputError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
     with Store(folder, read_only=True) as store:
         rows = store.rows()
         if not rows:
