@@ -242,10 +242,8 @@ def model_parameters(found):
         for value in given_.values()
         for v in (value if isinstance(value, tuple) else [value])
     )
-    model = cheap(name, **given_)
-    if big:  # what it learns would be as large as was asked for
-        answer(None, model.check_parameters)
-    else:
+    model = answer(None, lambda: cheap(name, **given_))
+    if model is not None and not big:  # what it learns would be as large as was asked for
         answer(None, lambda: model.fit(views(3, h=H, w=W)))
 
 

@@ -231,10 +231,10 @@ def test_two_sweeps_into_one_folder_at_once_are_refused(tmp_path):
 
 @pytest.fixture
 def small_disk(tmp_path) -> Iterator[Path]:
-    """A disk of 300 kB."""
+    """A disk of 150 kB."""
     disk = tmp_path / "disk"
     disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", disk], capture_output=True).returncode:
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=150k", "tmpfs", disk], capture_output=True).returncode:
         pytest.skip("no right to mount a tmpfs here (as root, it has)")
     yield disk
     subprocess.run(["umount", "-l", disk], check=True)
