@@ -141,15 +141,15 @@ class RunOptions(LearningOptions):
             raise InputError(f"offset_m {self.offset_m}; give a finite distance")
         if self.threads is not None and self.threads < 1:
             raise InputError(f"{self.threads} threads; give at least 1")
-        for name in (self.seed, self.world_seed, self.route_seed):
-            if name is not None and name < 0:
-                raise InputError(f"seed {name}; give a whole number from 0")
+        for seed in (self.seed, self.world_seed, self.route_seed):
+            if seed is not None and seed < 0:
+                raise InputError(f"seed {seed}; give a whole number from 0")
         if is_generated(self.world):
             WorldParams.named(self.world)
         elif not Path(self.world).exists():
             raise InputError(f"there is no world {self.world!r}; give one of {', '.join(PRESETS)}, or a file")
         if self.route is not None and not self.route.exists():
-            raise InputError(f"there is no route {self.route}")
+            raise InputError(f"there is no route {self.route}; give a file, or none to have one generated")
 
     def agent_settings(self) -> "AgentSettings":
         """How an agent walks by these flags."""

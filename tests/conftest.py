@@ -1,6 +1,8 @@
 """What all tests share. Shapes and types in signatures are checked while the tests run."""
 
 import signal
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -30,3 +32,14 @@ def sussex() -> Path:
     if not SUSSEX.is_dir():
         pytest.skip("the Sussex world is not on this machine (a folder shared/sussex beside the project)")
     return SUSSEX
+
+
+@pytest.fixture
+def small_disk(tmp_path) -> Iterator[Path]:
+    """A disk of 150 kB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=150k", "tmpfs", disk], capture_output=True).returncode:
+        pytest.skip("no right to mount a tmpfs here (as root, it has)")
+    yield disk
+    subprocess.run(["umount", "-l", disk], check=True)

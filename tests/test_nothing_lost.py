@@ -9,10 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from navigation.recording import viewer_program
 
@@ -22,17 +19,6 @@ WORLD = ["--world", "tiny", "--seed", "2", "--size", "120x25"]
 
 def tussock(*words, **options) -> subprocess.CompletedProcess:
     return subprocess.run([TUSSOCK, *map(str, words)], capture_output=True, text=True, **options)
-
-
-@pytest.fixture
-def small_disk(tmp_path) -> Iterator[Path]:
-    """A disk of 300 kB."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", disk], capture_output=True).returncode:
-        pytest.skip("no right to mount a tmpfs here (as root, it has)")
-    yield disk
-    subprocess.run(["umount", "-l", disk], check=True)
 
 
 def grow(disk: Path) -> None:

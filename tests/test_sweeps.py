@@ -229,17 +229,6 @@ def test_two_sweeps_into_one_folder_at_once_are_refused(tmp_path):
     )
 
 
-@pytest.fixture
-def small_disk(tmp_path) -> Iterator[Path]:
-    """A disk of 150 kB."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=150k", "tmpfs", disk], capture_output=True).returncode:
-        pytest.skip("no right to mount a tmpfs here (as root, it has)")
-    yield disk
-    subprocess.run(["umount", "-l", disk], check=True)
-
-
 def test_a_full_disk_is_said_and_with_room_the_sweep_goes_on(small_disk, tmp_path):
     path, out = written(tmp_path, MANY), small_disk / "out"
     done = subprocess.run([TUSSOCK, "sweep", path, "--out", out], capture_output=True, text=True)

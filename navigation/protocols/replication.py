@@ -1,6 +1,5 @@
 """Doing a protocol: its runs as a sweep in the folder of its report, and the report of them."""
 
-import io
 import json
 import re
 from collections.abc import Callable
@@ -16,7 +15,7 @@ from ..pages import cell, page, picture
 from ..studies.findings import Claim, Findings, plain
 from ..studies.report import FIGURES, REPORT, RESULTS
 from ..sweeps.spec import Sweep
-from ..sweeps.store import Store, table_of
+from ..sweeps.store import Store, read_steps, table_of
 from ..sweeps.sweep import run_sweep
 from ..sweeps.work import run_key
 from .protocol import Exhibit, Protocol, check_walked, place_of
@@ -49,7 +48,7 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
         rows = {key: row for key, row in store.rows().items() if key in wanted}
         for key, row in rows.items():
             if row["error"] is None:
-                row |= protocol.of_walk(row, pd.read_csv(io.StringIO(store.steps(key))))
+                row |= protocol.of_walk(row, read_steps(store.steps(key)))
                 row["place"] = place_of(row)
     errors = [_kind(row["error"]) for row in rows.values() if row["error"] is not None]
     table = (

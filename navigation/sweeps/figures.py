@@ -1,7 +1,5 @@
 """The figures of a sweep's report."""
 
-import io
-
 import numpy as np
 import pandas as pd
 from jaxtyping import UInt8
@@ -100,25 +98,3 @@ def seen(view: UInt8[np.ndarray, "h w c"], recognised: UInt8[np.ndarray, "h w c"
         panorama(axes[1, 0], recognised, "recognised")
         axes[0, 0].set_xlabel("")
     return figure
-
-
-def read_steps(text: str) -> pd.DataFrame:
-    """The steps of a run, from CSV; what is empty is missing."""
-    return pd.read_csv(
-        io.StringIO(text),
-        keep_default_na=False,
-        na_values={
-            name: [""]
-            for name in (
-                "match",
-                "place",
-                "reset",
-                "reason",
-                "cause",
-                "covered",
-                "nearest_view_m",
-                "recognised_view_m",
-                "turning_deg",
-            )
-        },
-    )

@@ -17,10 +17,10 @@ from ..failures import CAUSES, Evidence, in_words
 from ..pages import page, picture
 from ..studies.findings import plain
 from ..training import training_views
-from .figures import along_axis, read_steps, seen, walked
+from .figures import along_axis, seen, walked
 from .spec import SETTINGS
 from .statistics import MEASURES, Interval, axes_of, by_axis, means, pairings, spoken, words
-from .store import Store, table_of
+from .store import Store, read_steps, table_of
 from .sweep import WORST, worst_of
 from .work import options_of
 

@@ -1,5 +1,6 @@
 """The folder of a sweep: every finished run, kept as soon as it is there, each exactly once."""
 
+import io
 import json
 import sqlite3
 import zlib
@@ -119,6 +120,11 @@ def _type_of(values: pd.Series) -> str:
     if kinds <= {str}:
         return "string"
     return "boolean" if kinds == {bool} else "Int64" if kinds == {int} else "float64"
+
+
+def read_steps(text: str) -> pd.DataFrame:
+    """The steps of a run, from CSV; what is empty is missing."""
+    return pd.read_csv(io.StringIO(text))
 
 
 def write_table(table: pd.DataFrame, folder: Path) -> Path:

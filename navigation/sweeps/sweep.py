@@ -41,7 +41,8 @@ def run_sweep(
     began = time.perf_counter()
     runs = {run_key(run): run for run in sweep.runs()}
     with Store(out) as store:
-        missing = {key: run for key, run in runs.items() if key not in store.finished()}
+        finished = store.finished()
+        missing = {key: run for key, run in runs.items() if key not in finished}
         progress(len(runs) - len(missing), len(runs))
         try:
             if missing:
