@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from importlib.metadata import version
 from typing import Annotated, Any, Union
 
 import tyro
@@ -56,6 +57,9 @@ COMMANDS: dict[str, Any] = {
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 1 when a check finds something, 130 when interrupted."""
+    if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+        print(f"tussock {version('tussock')}")
+        return
     command = tyro.cli(
         choice_of(COMMANDS), prog="tussock", args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),

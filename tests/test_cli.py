@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import cv2
@@ -43,10 +44,31 @@ def files(folder: Path) -> set[str]:
 def test_help_names_every_command(capfd):
     code, out, _ = tussock(capfd, "--help")
     assert code == 0
-    names = ("world", "view", "route", "evaluate", "train", "compare", "models", "run", "play", "database")
+    names = (
+        "world",
+        "view",
+        "route",
+        "evaluate",
+        "train",
+        "compare",
+        "models",
+        "run",
+        "play",
+        "database",
+        "sweep",
+        "report",
+        "benchmark",
+        "replicate",
+        "study",
+    )
     assert all(name in out for name in names)
     for name in names:
         assert tussock(capfd, name, "--help")[0] == 0
+
+
+def test_version_is_that_of_the_package(capfd):
+    expected = tomllib.loads(Path(__file__).parents[1].joinpath("pyproject.toml").read_text())["project"]["version"]
+    assert tussock(capfd, "--version")[:2] == (0, f"tussock {expected}\n")
 
 
 def test_help_loads_nothing_heavy():
