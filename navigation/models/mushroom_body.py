@@ -13,6 +13,7 @@ from ..familiarity import Images, IncrementalModel, Learned, Scans
 from ..rotation import FilterBank, smoothed
 
 MOST_SHARES = 2**28  # of pixels in fields: 1 GB
+AT_ONCE = 128  # views that are learned
 
 
 @dataclass(kw_only=True, eq=False)
@@ -52,9 +53,10 @@ class MushroomBody(IncrementalModel):
     def _add(self, learned: Learned, views: Images) -> Learned:
         synapses = learned["synapses"].clone()
         fields = self._bank(*views.shape[1:])
-        for view in views:
-            (firing,) = self._firing(self._projection(fields, view)[:, :1], learned["wiring"])
-            synapses[firing] *= 1 - self.depression
+        for some in views.split(AT_ONCE):
+            unturned = torch.stack([self._projection(fields, view)[:, 0] for view in some], dim=1)
+            for firing in self._firing(unturned, learned["wiring"]):
+                synapses[firing] *= 1 - self.depression
         return {"wiring": learned["wiring"], "synapses": synapses}
 
     def check_parameters(self) -> None:
@@ -94,9 +96,9 @@ class MushroomBody(IncrementalModel):
         contrast, mean = torch.std_mean(averages, dim=1, keepdim=True, correction=0)
         return (averages - mean) / (contrast + 0.02 * contrast.max() + 1e-9) ** self.adaptation
 
-    def _firing(self, projection: Float32[torch.Tensor, "neurons w"], wiring: torch.Tensor) -> torch.Tensor:
-        """Indices (w, firing) of the Kenyon cells that fire at each rotation."""
-        drive = embedding_bag(wiring, projection.contiguous(), mode="sum")  # (cells, w)
+    def _firing(self, projections: Float32[torch.Tensor, "neurons n"], wiring: torch.Tensor) -> torch.Tensor:
+        """Indices (n, firing) of the Kenyon cells that fire at each of n projections."""
+        drive = embedding_bag(wiring, projections.contiguous(), mode="sum")  # (cells, n)
         return drive.T.contiguous().topk(self.firing, dim=1, sorted=False).indices
 
 
