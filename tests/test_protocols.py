@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from browser import WIDTHS, in_browser
 
 from navigation.cli import main
 from navigation.encoding import Encoding
@@ -273,6 +274,13 @@ def test_the_page_is_self_contained_and_has_everything(replication):
     files = sorted(f"{name}.{kind}" for name in drawn for kind in ("png", "svg"))
     assert sorted(path.name for path in (replication / "figures").iterdir()) == files
     assert "tussock replicate kagioulis2024 --world tiny --worlds 2 --quick --out" in page
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_browser_shows_the_page_without_errors(replication, tmp_path, width):
+    shown = in_browser(replication / "report.html", width, tmp_path)
+    pictures = sum(each.draw is not None for each in KAGIOULIS2024.exhibits)
+    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": pictures}
 
 
 def test_a_second_time_does_nothing_anew_and_changes_no_byte(replication, capsys):

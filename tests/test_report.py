@@ -1,9 +1,7 @@
 """The replication from the command line: its report in a real browser, its numbers, and what interruptions leave."""
 
 import json
-import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -11,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from browser import WIDTHS, in_browser
 
 from navigation.cli import main
 from navigation.studies.figures import PICTURES
@@ -90,39 +89,10 @@ def test_the_page_is_self_contained_and_has_everything(replication):
     assert sum(name.endswith(".svg") for name in figures) == len(PICTURES)
 
 
-PROBE = """<script>addEventListener("load", () => {
-  const wide = [...document.querySelectorAll("body *")].filter(e => e.getBoundingClientRect().right > innerWidth + 1
-    && !e.closest(".wide, pre")).map(e => e.tagName + "." + e.className);
-  const broken = [...document.images].filter(i => !i.complete || i.naturalWidth == 0).length;
-  const small = [...document.querySelectorAll("p, td, th, figcaption, pre")]
-    .filter(e => parseFloat(getComputedStyle(e).fontSize) < 11).length;
-  document.title = "PROBE" + JSON.stringify({width: innerWidth, wide, broken, small, images: document.images.length});
-});</script>"""
-
-
-@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("width", WIDTHS)
 def test_a_browser_shows_it_without_errors(replication, tmp_path, width):
-    browser = shutil.which("chromium") or shutil.which("chromium-browser")
-    if browser is None and not os.environ.get("TUSSOCK_REQUIRE_GL"):
-        pytest.skip("chromium is not installed (Debian: chromium)")
-    assert browser is not None
-    page = tmp_path / "probed.html"
-    page.write_text((replication / "report.html").read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"))
-    frame = tmp_path / "frame.html"  # a frame is as narrow as it is told to be; a window is not
-    frame.write_text(f"""<iframe src="probed.html" style="width:{width}px;height:800px;border:0"></iframe>
-<script>const copy = () => {{ document.title = document.querySelector("iframe").contentDocument.title; }};
-addEventListener("load", () => setInterval(copy, 50));</script>""")
-    done = subprocess.run(
-        [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-         "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}", "--enable-logging=stderr",
-         "--allow-file-access-from-files", "--window-size=1600,900", "--virtual-time-budget=8000", "--dump-dom", f"file://{frame}"],
-        capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
-    found = re.search(r"<title>PROBE(.*?)</title>", done.stdout)
-    assert found, done.stderr[-2000:]
-    probe = json.loads(found.group(1).replace("&quot;", '"').replace("&amp;", "&"))
-    assert "CONSOLE" not in done.stderr
-    assert probe == {"width": width, "wide": [], "broken": 0, "small": 0, "images": len(PICTURES)}
+    shown = in_browser(replication / "report.html", width, tmp_path)
+    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": len(PICTURES)}
 
 
 def test_a_second_run_finds_everything_done_and_changes_no_number(replication):

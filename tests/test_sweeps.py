@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 import psutil
 import pytest
+from browser import WIDTHS, in_browser
 
 from navigation.learning_options import RunOptions
 from navigation.sweeps.spec import read_sweep
@@ -372,6 +373,13 @@ def test_the_report_of_a_sweep_stands_by_itself(swept):
     assert html.count("data:image/png;base64,") == 3 + 2 * 5
     assert 'src="http' not in html
     assert all(row["command"] in html for row in table(swept).to_dict("records") if row["key"] in results["worst"])
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_browser_shows_the_report_without_errors(swept, tmp_path, width):
+    subprocess.run([TUSSOCK, "report", swept], capture_output=True, check=True)
+    shown = in_browser(swept / "report.html", width, tmp_path)
+    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": 3 + 2 * 5}
 
 
 def test_a_folder_without_a_sweep_has_no_report(tmp_path):
