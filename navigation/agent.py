@@ -37,7 +37,8 @@ class Step:
     """One look around and what came of it.
 
     index: 0 for the first look. pose: where the agent stands and faces as it looks. view: what it sees, RGBA.
-    familiarity: of every rotation, turned left by 0, 1, .. columns. turn: chosen, noise included (rad, left positive).
+    familiarity: of every rotation, turned left by 0, 1, .. columns. aim: turn to the most familiar heading (rad, left positive).
+    turn: the one it makes, which is the aim and noise.
     match: index of the learned view it recognised, None where the model keeps none.
     place: share of the learned sequence, 0 to 1, that the model believes to have walked; None where it does not know.
     deviation: distance from the route (m). along: how far along the route the nearest place is (m).
@@ -50,6 +51,7 @@ class Step:
     pose: Pose
     view: UInt8[np.ndarray, "height width 4"]
     familiarity: Float[np.ndarray, " w"]
+    aim: float
     turn: float
     match: int | None
     place: float | None
@@ -164,13 +166,13 @@ class Agent(AgentSettings):
         width = features.shape[2]
         windows = self._windows(width, poses[:, 2])
         familiarity, match = self._scan(features, windows, walks)
-        turns = best_turn(familiarity, windows)
+        aims = best_turn(familiarity, windows)
         deviation, along = self.route.nearest(poses[:, :2])
         towards = self.route.at(along)[:, 2]
-        columns = np.rint(columns_of_turn(turns, width)).astype(int) % width
+        columns = np.rint(columns_of_turn(aims, width)).astype(int) % width
         for k, walk in enumerate(walks):
             yield walk.step(
-                index, views[k], familiarity[k], turn=float(turns[k]), match=None if match is None else int(match[k, columns[k]]),
+                index, views[k], familiarity[k], aim=float(aims[k]), match=None if match is None else int(match[k, columns[k]]),
                 deviation=float(deviation[k]), along=float(along[k]), towards=float(towards[k]),
             )  # fmt: skip
 
@@ -211,16 +213,16 @@ class _Walk:
         self.ended = False
 
     def step(
-        self, index: int, view: np.ndarray, familiarity: np.ndarray, *, turn: float, match: int | None, deviation: float, along: float,
+        self, index: int, view: np.ndarray, familiarity: np.ndarray, *, aim: float, match: int | None, deviation: float, along: float,
         towards: float,
     ) -> Step:  # fmt: skip
-        """The step that follows from a look, taken. turn: to the most familiar heading; towards: the route's heading here (rad)."""
+        """The step that follows from a look, taken. towards: the route's heading here (rad)."""
         agent, pose = self.agent, self.pose
-        turn = float(wrap_angle(turn + agent.heading_noise * self.random.standard_normal()))
+        turn = float(wrap_angle(aim + agent.heading_noise * self.random.standard_normal()))
         reason = self.progress.look(index, pose, deviation, along)
         recovering = agent.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < agent.step_limit
         step = Step(
-            index=index, pose=pose, view=view, familiarity=familiarity, turn=turn, match=match,
+            index=index, pose=pose, view=view, familiarity=familiarity, aim=aim, turn=turn, match=match,
             place=None if self.following is None else self.following.place,
             deviation=deviation, along=along, error=float(wrap_angle(pose.heading + turn - towards)),
             reset=self.reset, reason=None if recovering else reason, failure=None if reason == ARRIVED else reason,
@@ -232,5 +234,5 @@ class _Walk:
             self.ended = True
         else:
             self.pose, self.reset = pose.turned(turn).moved(agent.step_length), None
-        self.progress.step()
+            self.progress.step()
         return step

@@ -134,7 +134,7 @@ class Witness:
             memory, poses = self._memory
             _, index = memory.match(self._encoding(step.view[None]))
             width = index.shape[1]
-            match = int(index[0, int(np.rint(columns_of_turn(step.turn, width))) % width])
+            match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
         return float(np.hypot(*(poses[match, :2] - step.pose[:2])))
 
     @cached_property

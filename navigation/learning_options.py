@@ -118,11 +118,14 @@ class RunOptions(LearningOptions):
         """Refuse what can be refused before a world is grown. Raises InputError."""
         import numpy as np
 
+        from render.renderer import check_backend
         from world.geometry import Route
         from world.params import PRESETS, WorldParams, is_generated
+        from world.walk import check_length
 
         from .familiarity import check_device
         from .models import make_model
+        from .rules import check_distance
         from .training import training_poses
 
         self.agent_settings()
@@ -134,11 +137,11 @@ class RunOptions(LearningOptions):
         self.eye()
         self.chosen_encoding()
         training_poses(Route.through(np.eye(2)), every=self.every, learning_walk=self.learning_walk_m)
-        for name in ("spacing_m", "route_length_m"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InputError(f"{name} {getattr(self, name)}; give a distance over 0")
+        check_backend(self.renderer)
+        check_distance("spacing", self.spacing_m)
+        check_length(self.route_length_m)
         if not math.isfinite(self.offset_m):
-            raise InputError(f"offset_m {self.offset_m}; give a finite distance")
+            raise InputError(f"an offset of {self.offset_m} m; give a finite distance")
         if self.threads is not None and self.threads < 1:
             raise InputError(f"{self.threads} threads; give at least 1")
         for seed in (self.seed, self.world_seed, self.route_seed):
@@ -146,9 +149,9 @@ class RunOptions(LearningOptions):
                 raise InputError(f"seed {seed}; give a whole number from 0")
         if is_generated(self.world):
             WorldParams.named(self.world)
-        elif not Path(self.world).exists():
+        elif not Path(self.world).is_file():
             raise InputError(f"there is no world {self.world!r}; give one of {', '.join(PRESETS)}, or a file")
-        if self.route is not None and not self.route.exists():
+        if self.route is not None and not self.route.is_file():
             raise InputError(f"there is no route {self.route}; give a file, or none to have one generated")
 
     def agent_settings(self) -> "AgentSettings":

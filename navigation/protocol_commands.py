@@ -29,7 +29,7 @@ class ProtocolCommand:
     worlds: int | None = None
     """How many generated worlds, or generated routes through a world that is given. Default: as many as in the original."""
     seed: int = 0
-    """Seed of the first generated world and route; the others follow."""
+    """Seed of the first generated world and route, the others follow; and of all noise and first weights."""
     cull_back_faces: bool = False
     """See triangles only from their front, as the original Sussex renderer did."""
     quick: bool = False
@@ -87,7 +87,9 @@ class ProtocolCommand:
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
         chosen: list[Choice] = places(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
         sweep = protocol.sweep(chosen, quick=self.quick)
-        sweep = dataclasses.replace(sweep, fixed=sweep.fixed | {"cull_back_faces": self.cull_back_faces})
+        sweep = dataclasses.replace(
+            sweep, fixed=sweep.fixed | {"cull_back_faces": self.cull_back_faces, "seed": self.seed}
+        )
         for run in sweep.runs():
             run.check()
         return sweep
@@ -105,6 +107,7 @@ class ProtocolCommand:
             "Routes": routes,
             "Walks": f"{len(sweep):,}",
         } | {key: value for key, given, value in (
+            ("Seed", bool(self.routes()), self.seed),
             ("Triangles", self.cull_back_faces, "seen from their front only"), ("Depth", self.quick, "a first look (--quick)"),
         ) if given}  # fmt: skip
 

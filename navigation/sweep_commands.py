@@ -38,13 +38,13 @@ class SweepCommand:
         check_workers(self.scheduler, self.workers)
         sweep = read_sweep(self.sweep)
 
-        from .sweeps.sweep import run_sweep
+        from .sweeps.sweep import record_worst, run_sweep
 
         say(f"{len(sweep)} runs: {', '.join(f'{len(choices)} of {name}' for name, choices in sweep.axes.items())}")
         with progress("walking", "runs", aloud=True) as report:
-            return run_sweep(
-                sweep, self.out, scheduler=self.scheduler, workers=self.workers, record=int(record[1]), progress=report
-            )
+            done = run_sweep(sweep, self.out, scheduler=self.scheduler, workers=self.workers, progress=report)
+        recorded = record_worst(sweep, self.out, int(record[1])) if self.record else []
+        return done | {"recordings": [str(folder) for folder in recorded]}
 
 
 @dataclass

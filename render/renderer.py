@@ -59,16 +59,21 @@ def open_renderer(
     threads: of the CPU renderer; None takes every core this process may run on. OpenGL decides for itself.
     Raises InputError when an explicit choice cannot be had, naming what to install.
     """
+    check_backend(backend)
     eye = eye or Eye()
     if backend in ("auto", "cpu"):
         from .scanline import ScanlineRenderer
 
         return ScanlineRenderer(world, eye, threads)
-    if backend in ("egl", "osmesa"):
-        from .raster import RasterRenderer
+    from .raster import RasterRenderer
 
-        return RasterRenderer(world, eye, backend)
-    raise InputError(f"unknown renderer {backend!r}; the renderers are {', '.join(BACKENDS)}")
+    return RasterRenderer(world, eye, backend)
+
+
+def check_backend(backend: str) -> None:
+    """Refuse what is no renderer's name. Raises InputError."""
+    if backend not in BACKENDS:
+        raise InputError(f"unknown renderer {backend!r}; the renderers are {', '.join(BACKENDS)}")
 
 
 def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:

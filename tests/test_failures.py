@@ -169,6 +169,35 @@ def looks(case: Case, model: str = "perfect-memory", mirror: bool = False):
         return step, Witness(renderer, GREY, route, poses).evidence(step)
 
 
+class Unnamed:
+    """A perfect memory that does not say which view it recognises."""
+
+    def __init__(self):
+        self.memory = make_model("perfect-memory")
+
+    def fit(self, views):
+        self.memory.fit(views)
+        return self
+
+    def scan(self, views):
+        return self.memory.scan(views)
+
+
+def test_noise_does_not_change_what_was_recognised():
+    """The view that an agent aims at is asked for, whoever has to find it, not one at the heading that noise has made of it."""
+    world = random_world(np.random.default_rng(3))
+    route = straight(0.0)
+    found = []
+    with open_renderer(world, EYE, "cpu") as renderer:
+        for memory in (make_model("perfect-memory"), Unnamed()):
+            poses = learn(memory, GREY, renderer, route.resampled(0.1).poses)
+            agent = Agent(renderer=renderer, encoding=GREY, model=memory, route=route, heading_noise=2.0, max_steps=30)
+            witness = Witness(renderer, GREY, route, poses)
+            found.append([witness.evidence(step) for step in agent.walk(agent.start())])
+    assert found[0] == found[1]
+    assert sum(each is not None for each in found[0]) > 5
+
+
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("name", CASES)
 def test_the_label_is_the_one_cause_that_applies(name, model):

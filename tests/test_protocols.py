@@ -14,11 +14,12 @@ from browser import WIDTHS, in_browser
 
 from navigation.cli import main
 from navigation.encoding import Encoding
+from navigation.learning_options import RunOptions
 from navigation.models import make_model
 from navigation.protocols import ARDIN2016, AZEVEDO2025, BADDELEY2012, KAGIOULIS2024, PROTOCOLS, places
 from navigation.protocols.azevedo2025 import of_walk
+from navigation.protocols.protocol import place_names
 from world.errors import InputError
-from world.geometry import Route
 
 TINY = ("--quick", "--world", "tiny", "--worlds", "2")
 
@@ -181,7 +182,7 @@ def test_kagioulis_by_hand():
 
 
 def test_azevedos_displacement_of_a_walk_by_hand():
-    row = {"route": None, "world": "tussock-field", "route_length_m": 10.0}
+    row = {"route_m": 10.0}
     steps = pd.DataFrame({"along_m": [0.0, 9.6, 9.8, 10.0, 10.0], "deviation_m": [4.0, 1.0, 2.0, 3.0, 99.0]})
     found = of_walk(row, steps)  # what comes after its end does not count
     assert found == {"displacement_m": 2.5, "last_displacement_m": 2.0}
@@ -190,18 +191,26 @@ def test_azevedos_displacement_of_a_walk_by_hand():
     assert np.isnan(short["last_displacement_m"])
 
 
-def test_azevedos_route_length_is_that_of_the_route(tmp_path):
-    from navigation.protocols.protocol import route_length
-    from world.files import write_route
+def test_a_route_has_the_length_that_it_has(tmp_path):
+    """What does not fit is shorter than asked for, in a world from a file as well."""
+    from navigation.sweeps.work import open_path, teach, walk
+    from world.files import write_world
     from world.scene import World
-    from world.walk import generate_route
 
-    write_route(Route.through(np.array([[0.0, 0], [3, 4]])), tmp_path / "route.csv")
-    assert route_length({"route": str(tmp_path / "route.csv")}) == pytest.approx(5)
-    for length in (2.0, 20.0):  # the second does not fit
-        route = generate_route(World.generate("tiny", seed=1), 1, length)
-        row = {"route": None, "world": "tiny", "route_length_m": length}
-        assert route_length(row) == pytest.approx(route.length, abs=0.02)
+    write_world(World.generate("tiny", seed=1), tmp_path / "world.glb")
+    for world in ("tiny", str(tmp_path / "world.glb")):
+        run = RunOptions(world=world, size="36x8", route_length_m=20.0, seed=1, max_steps=1, learning_walk_m=0.0)
+        path = open_path(run)
+        assert path[1].length < 5
+        assert walk(run, teach(run, path)).found["route_m"] == path[1].length
+
+
+def test_routes_of_one_name_are_told_apart():
+    rows = [
+        {"route": route, "route_seed": 4}
+        for route in ("/a/route.csv", "/b/route.csv", "/b/other.csv", None, "/a/route.csv")
+    ]
+    assert place_names(rows) == ["/a/route.csv", "/b/route.csv", "other", "route 4", "/a/route.csv"]
 
 
 def test_azevedo_by_hand():

@@ -10,8 +10,9 @@ import sqlite3
 import subprocess
 import sys
 import time
+import tracemalloc
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,12 @@ import pytest
 from browser import WIDTHS, in_browser
 
 from navigation.learning_options import RunOptions
+from navigation.sweeps.figures import along_axis
 from navigation.sweeps.spec import read_sweep
-from navigation.sweeps.statistics import axes_of, mean_interval, pairings
-from navigation.sweeps.store import TIMES, Store, table_of
-from navigation.sweeps.work import lesson_key, path_key, run_key
+from navigation.sweeps.statistics import axes_of, by_axis, mean_interval, pairings, worlds_of
+from navigation.sweeps.store import TIMES, Finished, Store, table_of
+from navigation.sweeps.sweep import finished_run, record_again
+from navigation.sweeps.work import Walked, lesson_key, options_of, path_key, run_key
 from world.errors import InputError
 
 BIN = Path(sys.executable).parent
@@ -271,6 +274,16 @@ REFUSED = [
     ("[fixed]\nworld = 'there-is-none.glb'\n[axes]\nseed = [1]\n", "line 2: there is no world"),
     ("[axes]\nworld = ['tiny', 'tiny field_width=900']\n", "line 2: world 'tiny field_width=900': field_width is 900"),
     ("[axes]\nseed = {from=0, to=9999}\noffset-m = {from=0, to=1, count=9999}\n", "asks for 99,990,000 runs; ask for 1,000,000 at most"),
+    ("[axes]\nseed = {from=0, to=1e308}\n", "line 2: the range"),
+    ("[axes]\noffset-m = {from=-1e308, to=1e308, count=3}\n", "line 2: the range"),
+    ("[axes]\noffset-m = {from=0, to=1, step=5e-324}\n", "line 2: the range"),
+    (f"[axes]\nseed = {{from=0, to=1{'0' * 400}}}\n", "line 2: a range is"),
+    (f"[axes]\noffset-m = [1{'0' * 400}]\n", "line 2: offset-m is 1000"),
+    ("[axes]\n" + "".join(f"{name} = {{from=1, to=99999}}\n" for name in ("seed", "world-seed", "route-seed", "every")), "asks for 99,9"),
+    ("[axes]\noffset-m = [0]\noffset_m = [0.1, 0.2]\n", "line 2: offset_m is there twice; leave one out"),
+    ("[axes]\nrenderer = ['cpu', 'gpu']\n", "line 2: unknown renderer 'gpu'"),
+    ("[axes]\nroute-length-m = [1, 0.05]\n", "line 2: a route of 0.05 m"),
+    ("[fixed]\nroute = '.'\n[axes]\nseed = [1]\n", "line 2: there is no route"),
     ("[axes]\nwho = [{model = 'rbm'}, {encoding = 'grey'}]\n", "line 2: all choices of who set the same: model"),
 ]  # fmt: skip
 
@@ -315,6 +328,92 @@ def test_keys_tell_apart_what_is_different_and_nothing_else(tmp_path):
     assert len(keys) == 2  # it is the content of a file that counts, wherever it lies
 
 
+def kept(key: str, settings: dict, *, again: bool = False, **row) -> Finished:
+    return Finished(key=key, settings=settings, row=settings | row, steps="x_m\n0\n", again=again)
+
+
+def test_settings_have_one_row_the_newest(tmp_path):
+    with Store(tmp_path) as store:
+        store.add([kept("a", {"route": "r.csv"}, steps=1), kept("b", {"route": "s.csv"}, steps=2)])
+        store.add([kept("c", {"route": "r.csv"}, steps=3)])  # the file holds another route now
+        assert {key: row["steps"] for key, row in store.rows().items()} == {"b": 2, "c": 3}
+
+
+def test_what_could_not_be_done_is_a_row_and_tried_again(tmp_path):
+    run = RunOptions(world="tiny")
+    first = finished_run(run, "a", InputError("no EGL on this machine"))
+    with Store(tmp_path) as store:
+        store.add([first])
+        assert store.finished() == set()
+        assert store.rows()["a"]["error"] == "no EGL on this machine"
+        store.add([finished_run(run, "a", Walked(found={"arrived": True}, steps="", seconds=1, learn_seconds=1))])
+        assert store.finished() == {"a"}
+        assert store.rows()["a"]["error"] is None
+        outside = Walked(refused="the start is outside", found={}, steps="", seconds=0, learn_seconds=1)
+        store.add([finished_run(run, "b", outside)])
+        assert store.finished() == {"b"}  # of the same settings; and it stays outside
+
+
+def test_files_of_a_sweep_are_found_from_everywhere(tmp_path, monkeypatch):
+    (tmp_path / "route.csv").write_text("x_m,y_m\n0,0\n1,1\n")
+    written(tmp_path, "[fixed]\nroute = 'route.csv'\n[axes]\nseed = [1]\n")
+    monkeypatch.chdir(tmp_path)
+    (run,) = read_sweep(Path("sweep.toml")).runs()
+    assert run.route == tmp_path / "route.csv"
+
+
+@pytest.mark.parametrize("damage", ["middle", "columns", "killed"])
+def test_a_damaged_folder_is_said_in_one_line(tmp_path, damage, swept):
+    out = tmp_path / "out"
+    shutil.copytree(swept, out)
+    path = out / "finished.sqlite"
+    if damage == "middle":
+        whole = bytearray(path.read_bytes())
+        whole[4096:-4096] = b"\xa5" * (len(whole) - 8192)
+        path.write_bytes(whole)
+    elif damage == "columns":
+        path.unlink()
+        with closing(sqlite3.connect(path)) as database:
+            database.execute("CREATE TABLE runs (key TEXT)")
+    else:  # in the middle of a transaction
+        script = (
+            "import os, sqlite3, sys; d = sqlite3.connect(sys.argv[1]); d.execute('PRAGMA cache_size=1')\n"
+            "d.execute('UPDATE runs SET row = hex(zeroblob(100000))'); os._exit(0)"
+        )
+        subprocess.run([sys.executable, "-c", script, path], check=True)
+        assert (out / "finished.sqlite-journal").stat().st_size > 0
+    done = subprocess.run([TUSSOCK, "report", out, "--worst", "0"], capture_output=True, text=True)
+    if damage == "killed":
+        assert done.returncode == 0, done.stderr  # what was finished before is all there
+    else:
+        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+        assert "finished.sqlite cannot be used" in done.stderr
+
+
+def test_a_recording_of_another_walk_does_not_stay(swept, tmp_path):
+    with Store(swept, read_only=True) as store:
+        row = next(iter(store.rows().values()))
+    run = options_of(row)
+    record_again(run, row, tmp_path / "here")
+    assert (tmp_path / "here" / "recording.rrd").exists()
+    for _ in range(2):  # the second time, too
+        with pytest.raises(InputError, match=r"went another way \(steps\)"):
+            record_again(run, row | {"steps": row["steps"] + 1}, tmp_path / "here")
+        assert not (tmp_path / "here").exists()
+
+
+def test_a_figure_has_every_choice():
+    """An axis that was added later, so that earlier runs have none; and numbers that differ in their last digits."""
+    for choices in ([None, 1.0, 2.0], [0.1, 0.1000001], [100000.1, 100000.2]):
+        rows = [
+            {"world": "tiny", "world_seed": k, "seed": k, "route": None, "route_seed": None, "resize": each, "arrived": True}
+            for each in choices for k in range(3)
+        ]  # fmt: skip
+        frame = table_of({str(k): row for k, row in enumerate(rows)})
+        assert len(by_axis(frame, ["resize"], ["arrived"])) == len(choices)
+        along_axis(frame, ["resize"], ["arrived"], [])
+
+
 def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
     rows = {
         str(k): {"seed": k % 5, "model": "ab"[k % 2], "route": None if k % 3 else "r", "error": None} for k in range(20)
@@ -335,7 +434,30 @@ def test_intervals_are_those_of_the_textbook():
     shared = np.repeat(random.normal(size=40), 50)
     wide = mean_interval(shared, worlds)
     assert 0.8 < (wide.high - wide.low) / (2 * 1.96 * shared.std() / 40**0.5) < 1.2
-    assert mean_interval(np.array([]), np.array([], dtype=int)).value != 0
+    assert np.isnan(mean_interval(np.array([]), np.array([], dtype=int)).value)
+    one = mean_interval(np.array([3.0]), np.array([0]))
+    assert one.value == 3
+    assert np.isnan([one.low, one.high]).all()  # nobody knows how another one would differ
+
+
+def test_runs_in_one_world_are_not_independent():
+    rows = [
+        {"world": world, "world_seed": seed, "seed": 5, "route": route, "route_seed": route_seed}
+        for world, route in (("tiny", None), ("a.glb", None), ("a.glb", "b.csv"))
+        for seed in (None, 5, 6)
+        for route_seed in (None, 1)
+    ]
+    found = worlds_of(pd.DataFrame(rows)).tolist()
+    # Of generated worlds there are two; in that of a file, two generated routes and one from a file.
+    assert found == [0, 0, 0, 0, 1, 1, 2, 3, 2, 3, 2, 3, 4, 4, 4, 4, 4, 4]
+
+
+def test_many_groups_take_little_memory():
+    tracemalloc.start()
+    mean_interval(np.ones(30_000), np.arange(30_000))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2**27
 
 
 def test_models_are_compared_where_all_else_is_alike():

@@ -22,6 +22,7 @@ CELL = 0.02  # m, of the occupancy grid
 RIM = 20  # cells around the field, so that obstacles just outside count
 NODE = 3  # cells between the nodes that paths are planned through
 KEEP_AWAY = 0.04  # m from every obstacle
+SHORTEST = 0.1  # m, of a route
 PREFERRED = 0.12  # m; tighter than this costs more than twice the way
 SPACING = 0.01  # m between points of a route
 SHARPEST = np.radians(30)  # within 2 cm
@@ -55,8 +56,7 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     goal: where it ends (m), to within a decimetre; so routes with several seeds lead to one place.
     Raises InputError where the world has no room for it, or none at the goal.
     """
-    if not 0.1 <= length < np.inf:
-        raise InputError(f"a route of {length} m; give a length of at least 0.1 m")
+    check_length(length)
     rng, field = seeded(seed), world.field
     sides = np.array([field.x_max - field.x_min, field.y_max - field.y_min])
     length = min(float(length), 0.8 * float(np.hypot(*sides)))
@@ -82,6 +82,12 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
         f"found no route of {length:.2f} m in the field ({field}) that keeps {100 * KEEP_AWAY:g} cm clear of plants; "
         "ask for a shorter one or for less vegetation"
     )
+
+
+def check_length(length: float) -> None:
+    """Refuse what is no length of a route (m). Raises InputError."""
+    if not SHORTEST <= length < np.inf:
+        raise InputError(f"a route of {length} m; give a length of at least {SHORTEST} m")
 
 
 def check_route(world: World, route: Route) -> None:

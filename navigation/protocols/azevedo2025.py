@@ -7,7 +7,7 @@ import pandas as pd
 
 from ..studies.findings import Claim, Findings
 from .figures import curves
-from .protocol import Exhibit, Parameter, Protocol, route_length
+from .protocol import Exhibit, Parameter, Protocol
 
 FARTHEST, STARTS = 5.5, 45  # m to either side; starts from one side to the other
 LENGTH, STEP = 20.0, 0.1  # m
@@ -20,7 +20,7 @@ def of_walk(row: dict[str, Any], steps: pd.DataFrame) -> dict[str, float]:
 
     A walk counts until it has passed the route's end.
     """
-    length = route_length(row)
+    length = row["route_m"]
     past = np.flatnonzero(steps["along_m"] >= length - STEP / 2)
     counted = steps.iloc[: past[0] + 1] if len(past) else steps
     last = counted[counted["along_m"] >= (1 - LAST) * length]

@@ -1,7 +1,7 @@
 """A published experiment: the runs it asks for, what was published, and how its numbers come from the runs."""
 
-import math
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,8 +9,6 @@ from typing import Any
 import pandas as pd
 
 from world.errors import InputError
-from world.files import read_route
-from world.params import WorldParams, is_generated
 
 from ..studies.findings import Findings
 from ..sweeps.spec import Choice, Sweep
@@ -73,28 +71,20 @@ class Protocol:
 
 def places(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) -> list[Choice]:
     """Worlds with a route each: given routes through one world, or `count` generated ones, of the seeds from `seed` on."""
+    if Path(world).is_file():
+        world = str(Path(world).resolve())  # found from everywhere
     if routes:
-        return [{"world": world, "world_seed": seed, "route": route} for route in routes]
-    if is_generated(world):
-        return [{"world": world, "world_seed": each, "route_seed": each} for each in range(seed, seed + count)]
-    return [{"world": world, "world_seed": seed, "route_seed": each} for each in range(seed, seed + count)]
+        found = [route.resolve() if route.is_file() else route for route in routes]
+        return [{"world": world, "world_seed": seed, "route": route} for route in found]
+    return [{"world": world, "world_seed": each, "route_seed": each} for each in range(seed, seed + count)]
 
 
-def place_of(row: dict[str, Any]) -> str:
-    """What a report calls the place of a run."""
-    return Path(row["route"]).stem if row["route"] else f"route {row['route_seed']}"
-
-
-def route_length(row: dict[str, Any]) -> float:
-    """Length (m) of the route of a run."""
-    if row["route"]:
-        return read_route(row["route"]).length
-    if not is_generated(row["world"]):
-        return row["route_length_m"]
-    params = WorldParams.named(row["world"])
-    return min(
-        row["route_length_m"], 0.8 * math.hypot(params.field_width, params.field_depth)
-    )  # as routes are generated
+def place_names(rows: Collection[dict[str, Any]]) -> list[str]:
+    """What a report calls the place of each run: the name of the route's file, in full where several have it."""
+    routes = [row["route"] for row in rows]
+    stems = Counter(Path(route).stem for route in {each for each in routes if each})
+    short = {route: Path(route).stem if stems[Path(route).stem] == 1 else route for route in routes if route}
+    return [short[route] if route else f"route {row['route_seed']}" for route, row in zip(routes, rows, strict=True)]
 
 
 def by_model(walks: pd.DataFrame) -> list[str]:

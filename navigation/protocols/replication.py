@@ -18,7 +18,7 @@ from ..sweeps.spec import Sweep
 from ..sweeps.store import Store, read_steps, table_of
 from ..sweeps.sweep import run_sweep
 from ..sweeps.work import run_key
-from .protocol import Exhibit, Protocol, check_walked, place_of
+from .protocol import Exhibit, Protocol, check_walked, place_names
 
 
 def replicate(
@@ -46,10 +46,10 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
     wanted = {run_key(run) for run in sweep.runs()}
     with Store(out, read_only=True) as store:
         rows = {key: row for key, row in store.rows().items() if key in wanted}
-        for key, row in rows.items():
+        for (key, row), place in zip(rows.items(), place_names(rows.values()), strict=True):
+            row["place"] = place
             if row["error"] is None:
                 row |= protocol.of_walk(row, read_steps(store.steps(key)))
-                row["place"] = place_of(row)
     errors = [_kind(row["error"]) for row in rows.values() if row["error"] is not None]
     table = (
         table_of({key: row for key, row in rows.items() if row["error"] is None}) if len(errors) < len(rows) else None

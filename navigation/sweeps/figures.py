@@ -22,7 +22,7 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
     figure, axes = canvas((7.2, 0.6 + 2.1 * len(measures)), len(measures), 1, sharex=True)
     parts = [(words(key), part) for key, part in table.groupby(by, dropna=False, sort=True)] if by else [("", table)]
     names = list(by_axis(table, axis, []))
-    numeric = len(axis) == 1 and pd.api.types.is_numeric_dtype(table[axis[0]])
+    numeric = len(axis) == 1 and pd.api.types.is_numeric_dtype(table[axis[0]]) and not bool(table[axis[0]].isna().any())
     joined = numeric and not axis[0].endswith("seed")
     places = np.sort(table[axis[0]].unique().astype(float)) if numeric else np.arange(len(names), dtype=float)
     room = np.diff(places).min() if len(places) > 1 else 1.0

@@ -16,6 +16,7 @@ from world.files import replacing
 from ..failures import CAUSES, Evidence, in_words
 from ..pages import page, picture
 from ..studies.findings import plain
+from ..studies.report import RESULTS as REPLICATED
 from ..training import training_views
 from .figures import along_axis, seen, walked
 from .spec import SETTINGS
@@ -25,19 +26,17 @@ from .sweep import WORST, worst_of
 from .work import options_of
 
 REPORT, RESULTS, FIGURES = "report.html", "report.json", "figures"
-NOT_AXES = ("threads", "renderer")  # they change no result, or hardly
-Progress = Callable[[int, int], object]
 
 
 def write_sweep_report(
-    folder: Path, *, worst: int = 5, progress: Progress = lambda done, total: None
+    folder: Path, *, worst: int = 5, progress: Callable[[int, int], object] = lambda done, total: None
 ) -> dict[str, Any]:
     """Write report.html, report.json and the figures of a sweep into its folder; return report.json's content.
 
     worst: how many of the worst walks are shown. A sweep may go on meanwhile. Raises InputError where the folder holds no
     finished run, or a replication.
     """
-    if (folder / "results.json").exists():
+    if (folder / REPLICATED).exists():
         raise InputError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
     with Store(folder, read_only=True) as store:
         rows = store.rows()
@@ -49,7 +48,7 @@ def write_sweep_report(
     ran = table[table["error"].isna()].reset_index(drop=True)
     if ran.empty:
         raise InputError(f"no run in {folder} could be done; the first: {table['error'].iloc[0]}")
-    settings = [name for name in SETTINGS if name not in NOT_AXES]
+    settings = list(SETTINGS)
     axes = axes_of(ran, settings)
     reset = bool(ran["resets"].to_numpy().any())
     measures = [name for name in MEASURES if name != "resets" or reset]
@@ -125,11 +124,7 @@ def _rows(choices: dict[str, dict[str, Any]]) -> list[tuple[str, int, list[tuple
 
 def _about(table: pd.DataFrame, ran: pd.DataFrame, axes: dict[str, list[str]]) -> dict[str, Any]:
     """What was swept, in words."""
-    fixed = {
-        name: ran[name].iloc[0]
-        for name in SETTINGS
-        if name not in NOT_AXES and not any(name in names for names in axes.values())
-    }
+    fixed = {name: ran[name].iloc[0] for name in SETTINGS if not any(name in names for names in axes.values())}
     said = [
         f"{spoken(name)} {value}"
         for name, value in fixed.items()

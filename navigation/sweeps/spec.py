@@ -82,11 +82,15 @@ class _Reader:
                 f"{self.path} has no [axes]; name what is to vary, for example offset-m = [-0.1, 0.0, 0.1]"
             )
         fixed = self.settings("fixed", self.document.get("fixed", {}))
-        axes = {name.replace("-", "_"): self.choices(name, values) for name, values in self.document["axes"].items()}
+        axes: dict[str, list[Choice]] = {}
+        for name, values in self.document["axes"].items():
+            if name.replace("-", "_") in axes:
+                raise self.error("axes", name, f"{name} is there twice; leave one out")
+            axes[name.replace("-", "_")] = self.choices(name, values)
         self.check_names(fixed, axes)
         sweep = Sweep(title=self.document.get("title", self.path.stem), fixed=fixed, axes=axes)
-        if len(sweep) > MOST_RUNS:
-            raise InputError(f"{self.path} asks for {len(sweep):,} runs; ask for {MOST_RUNS:,} at most")
+        if (count := math.prod(map(len, axes.values()))) > MOST_RUNS:
+            raise InputError(f"{self.path} asks for {count:,} runs; ask for {MOST_RUNS:,} at most")
         self.check_values(fixed, axes)
         for number, run in enumerate(sweep.runs(), 1):
             try:
@@ -136,14 +140,20 @@ class _Reader:
         """The numbers of { from = , to = , step = } (1 where it is left out) or { from = , to = , count = }, both ends included."""
         keys = set(given)
         known = keys in ({"from", "to"}, {"from", "to", "step"}, {"from", "to", "count"})
-        if not known or not all(_is_number(value) and math.isfinite(value) for value in given.values()):
+        if not known or not all(_is_number(value) for value in given.values()):
             raise self.error(
                 "axes", name, f"a range is {{ from = 0, to = 19 }}, with step or count if need be, not {given}"
             )
         low, high = given["from"], given["to"]
         step = given.get("step", 1)
-        count = given.get("count", math.floor((high - low) / step + 1e-9) + 1 if step > 0 else 0)
-        if not (isinstance(count, int) and 1 <= count <= MOST_RUNS and low <= high and (count > 1 or low == high)):
+        steps = (high - low) / step if step > 0 else -1
+        count = given.get("count", math.floor(steps + 1e-9) + 1 if 0 <= steps <= MOST_RUNS else 0)
+        if not (
+            isinstance(count, int)
+            and 1 <= count <= MOST_RUNS
+            and 0 <= high - low < math.inf
+            and (count > 1 or low == high)
+        ):
             raise self.error("axes", name, f"the range {given} holds no numbers, or too many")
         if "count" in given and count > 1:
             step = (high - low) / (count - 1)
@@ -168,13 +178,13 @@ class _Reader:
         return chosen
 
     def value(self, name: str, value: Any, kinds: tuple[type, ...]) -> Any:
-        """A value as the flag has it; file names as they are from where we are."""
+        """A value as the flag has it; file names as they are from everywhere."""
         if name == "world" and Path(value).suffix and not is_generated(value):
-            return str(self.path.parent / value)
+            return str((self.path.parent / value).resolve())
         if name == "model" and value.endswith(FILE_SUFFIX):
-            return str(self.path.parent / value)
+            return str((self.path.parent / value).resolve())
         if Path in kinds:
-            return self.path.parent / value
+            return (self.path.parent / value).resolve()
         return float(value) if float in kinds else value
 
     def error(self, table: str, key: str, message: str, *values: Any) -> InputError:
@@ -207,7 +217,7 @@ def _fits(value: Any, kinds: tuple[type, ...]) -> bool:
     if isinstance(value, bool):
         return bool in kinds
     if isinstance(value, int):
-        return int in kinds or float in kinds
+        return _is_number(value) and (int in kinds or float in kinds)
     return (isinstance(value, float) and float in kinds) or (isinstance(value, str) and (str in kinds or Path in kinds))
 
 
@@ -217,4 +227,7 @@ def _words(kinds: tuple[type, ...]) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    """Whether it is a finite number, a whole one of 64 bits at most."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, int) and not isinstance(value, bool) and -(2**63) <= value < 2**63

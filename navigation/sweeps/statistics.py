@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float, Int
 
+from world.params import is_generated
+
 SAMPLES = 4000  # of a bootstrap
 CONFIDENCE = 0.95
 MEASURES = {  # what is compared: column of the table -> words
@@ -19,7 +21,7 @@ MEASURES = {  # what is compared: column of the table -> words
 }
 HIGHER_IS_BETTER = ("arrived",)
 _RANK = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # what is asked first, and last
-PLACES = ("world", "world_seed", "route", "route_seed", "route_length_m")  # settings that make a world and a route
+AT_ONCE = 2**22  # numbers that are drawn
 
 
 @dataclass(frozen=True)
@@ -49,24 +51,35 @@ class Pairing:
 def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"], seed: int = 0) -> Interval:
     """Mean of values and its percentile bootstrap interval. Whole groups are drawn, as runs in one world are not independent.
 
-    groups: number of the group of each value. Where there is but one group, single values are drawn. nan where there are no values.
+    groups: number of the group of each value. Where there is but one group, single values are drawn. nan where nothing can be said:
+    of the mean of no values, and of the interval of one.
     """
-    if len(values) == 0:
-        return Interval(np.nan, np.nan, np.nan)
+    if len(values) < 2:
+        return Interval(float(values.sum()) if len(values) else np.nan, np.nan, np.nan)
     if len(np.unique(groups)) == 1:
         groups = np.arange(len(values))
     _, number = np.unique(groups, return_inverse=True)
     sums, counts = np.bincount(number, weights=values), np.bincount(number)
-    drawn = np.random.default_rng(seed).multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=SAMPLES)
-    means = (drawn @ sums) / (drawn @ counts)
+    rng, part = np.random.default_rng(seed), min(SAMPLES, max(1, AT_ONCE // len(sums)))
+    means = np.empty(SAMPLES)
+    for begin in range(0, SAMPLES, part):
+        here = means[begin : begin + part]
+        drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=len(here))
+        here[:] = (drawn @ sums) / (drawn @ counts)
     low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Interval(float(values.mean()), float(low), float(high))
 
 
-def places_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
-    """Number of the world and route of each run."""
-    seeds = {name: table[name].fillna(table["seed"]) for name in ("world_seed", "route_seed")}
-    return table.assign(**seeds).groupby(list(PLACES), dropna=False, sort=False).ngroup().to_numpy()
+def worlds_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
+    """Number of the world of each run; in a world from a file, of the route through it."""
+    generated = table["world"].map(is_generated).astype(bool)
+    given = table[["world_seed", "route_seed"]].astype(object)
+    seeds = given.where(given.notna(), table[["seed", "seed"]].to_numpy(dtype=object))
+    where = pd.DataFrame({
+        "world": table["world"], "world_seed": seeds["world_seed"].where(generated),
+        "route": table["route"].mask(generated), "route_seed": seeds["route_seed"].mask(generated | table["route"].notna()),
+    })  # fmt: skip
+    return where.groupby(list(where), dropna=False, sort=False).ngroup().to_numpy()
 
 
 def axes_of(table: pd.DataFrame, settings: Sequence[str]) -> dict[str, list[str]]:
@@ -89,7 +102,7 @@ def spoken(setting: str) -> str:
 
 def means(table: pd.DataFrame, measures: Sequence[str]) -> dict[str, Interval]:
     """Mean and interval of each measure over runs."""
-    groups = places_of(table)
+    groups = worlds_of(table)
     return {measure: mean_interval(table[measure].to_numpy(dtype=float), groups) for measure in measures}
 
 
@@ -105,7 +118,8 @@ def words(key: object) -> str:
     """A choice of an axis as people read it."""
     values: tuple[Any, ...] = key if isinstance(key, tuple) else (key,)
     return ", ".join(
-        "by default" if pd.isna(value) else f"{value:g}" if isinstance(value, float) else str(value) for value in values
+        "by default" if pd.isna(value) else repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
+        for value in values
     )
 
 
@@ -115,10 +129,10 @@ def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[st
     parts = {words(key): part for key, part in table.groupby(axis, dropna=False, sort=True)}
     found = []
     for first, second in combinations(parts, 2):
-        both = parts[first].merge(parts[second], on=rest, suffixes=("", "_other"))
+        both = parts[first].merge(parts[second], on=rest, suffixes=("", "_other"), validate="one_to_one")
         if both.empty:
             continue
-        groups, difference, better, worse = places_of(both), {}, {}, {}
+        groups, difference, better, worse = worlds_of(both), {}, {}, {}
         for measure in measures:
             values = both[measure].to_numpy(dtype=float) - both[f"{measure}_other"].to_numpy(dtype=float)
             gain = values if measure in HIGHER_IS_BETTER else -values

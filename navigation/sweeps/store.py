@@ -2,9 +2,11 @@
 
 import io
 import json
+import os
 import sqlite3
 import zlib
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +17,29 @@ from world.errors import InputError
 from world.files import replacing
 
 FINISHED, TABLE, LOCK = "finished.sqlite", "runs.parquet", ".lock"
+_COLUMNS = ("key", "settings", "row", "steps", "again")
 TIMES = ("seconds", "learn_seconds")  # columns of the table that no two sweeps have alike
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """A run to be kept. key: of all that decides it. settings: as its row has them. steps: its trajectory as CSV.
+
+    again: it could not be done now, and is to be tried again another time.
+    """
+
+    key: str
+    settings: dict[str, Any]
+    row: dict[str, Any]
+    steps: str
+    again: bool = False
 
 
 class Store:
     """The finished runs in a folder; use it in a `with` statement. While it is open to be written to, no other sweep may write.
 
     The table is SQLite's: a row that was added stays, and one that was not yet is not there at all, whatever ends the process.
+    Settings have one row: where a file that they name has changed, the run with what it holds now takes the other's place.
     """
 
     def __init__(self, folder: Path, *, read_only: bool = False):
@@ -35,42 +53,59 @@ class Store:
         else:
             self.lock = _locked(folder)
         try:
-            self._database = sqlite3.connect(
-                f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}", uri=True, timeout=60
-            )
+            # A reader, too, has to clean up after a writer that was killed, where it may write.
+            mode = "rwc" if not read_only else "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
+            self._database = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=60)
             if not read_only:
                 with self._database:
                     self._database.execute(
-                        "CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT NOT NULL, steps BLOB)"
+                        "CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, settings TEXT NOT NULL UNIQUE, row TEXT NOT NULL, "
+                        "steps BLOB NOT NULL, again INTEGER NOT NULL)"
                     )
-            self._database.execute("SELECT count(*) FROM runs").fetchone()
+            self._database.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs LIMIT 1").fetchone()
         except sqlite3.DatabaseError as error:
             self.close()
             raise _unusable(path, error) from error
 
     def finished(self) -> set[str]:
-        """The keys of the runs that are finished."""
-        return {key for (key,) in self._database.execute("SELECT key FROM runs")}
+        """The keys of the runs that are finished, without those to be tried again."""
+        return {key for (key,) in self._read("SELECT key FROM runs WHERE NOT again")}
 
-    def add(self, runs: Iterable[tuple[str, dict[str, Any], str]]) -> None:
-        """Keep finished runs: the key, row and steps (CSV) of each. All of them, or, where that fails, none. Raises InputError."""
+    def add(self, runs: Iterable[Finished]) -> None:
+        """Keep finished runs: all of them, or, where that fails, none. Raises InputError."""
         try:
             with self._database:
                 self._database.executemany(
-                    "INSERT OR IGNORE INTO runs VALUES (?, ?, ?)",
-                    [(key, json.dumps(row, default=str), zlib.compress(steps.encode())) for key, row, steps in runs],
+                    "INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?)",
+                    [
+                        (
+                            run.key,
+                            json.dumps(run.settings),
+                            json.dumps(run.row),
+                            zlib.compress(run.steps.encode()),
+                            run.again,
+                        )
+                        for run in runs
+                    ],
                 )
         except sqlite3.Error as error:
             raise _unusable(self.folder / FINISHED, error) from error
 
     def rows(self) -> dict[str, dict[str, Any]]:
         """The row of each finished run, by its key."""
-        return {key: json.loads(row) for key, row in self._database.execute("SELECT key, row FROM runs")}
+        return {key: json.loads(row) for key, row in self._read("SELECT key, row FROM runs")}
 
     def steps(self, key: str) -> str:
         """The steps of a finished run, as CSV."""
-        (packed,) = self._database.execute("SELECT steps FROM runs WHERE key = ?", [key]).fetchone()
+        ((packed,),) = self._read("SELECT steps FROM runs WHERE key = ?", key)
         return zlib.decompress(packed).decode()
+
+    def _read(self, query: str, *values: str) -> list[tuple]:
+        """What the database answers. Raises InputError where it is damaged."""
+        try:
+            return self._database.execute(query, values).fetchall()
+        except sqlite3.Error as error:
+            raise _unusable(self.folder / FINISHED, error) from error
 
     def close(self) -> None:
         """Let others write."""

@@ -1,8 +1,10 @@
 """Doing a sweep: on the cores of this machine or on any running Dask cluster, and going on where an earlier one stopped."""
 
 import dataclasses
+import json
 import logging
 import os
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -20,23 +22,22 @@ from ..options import words_of
 from ..terminal import say
 from . import work
 from .spec import Sweep
-from .store import Store, table_of, write_table
-from .work import Walked, lesson_key, open_path, path_key, run_key, teach, walk
+from .store import Finished, Store, table_of, write_table
+from .work import Walked, lesson_key, open_path, path_key, run_key, settings_of, teach, walk
 
 WORST = "worst"  # folder of the recordings
 SECONDS = 10.0  # to wait for a scheduler
-Progress = Callable[[int, int], object]
 
 
 def run_sweep(
-    sweep: Sweep, out: Path, *, scheduler: str | None = None, workers: int | None = None, record: int = 0,
-    progress: Progress = lambda done, total: None,
+    sweep: Sweep, out: Path, *, scheduler: str | None = None, workers: int | None = None,
+    progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> dict[str, Any]:  # fmt: skip
     """Do the runs of a sweep that the folder does not hold yet, keeping each as soon as it is finished.
 
-    scheduler: address of a running Dask scheduler; None starts `workers` processes here (None: one a core). record: keep recordings of
-    so many of the worst runs. Returns what `tussock sweep` says. Raises InputError where another sweep writes to the folder, and
-    where runs could not be finished: all others are kept.
+    scheduler: address of a running Dask scheduler; None starts `workers` processes here (None: one a core). Returns what
+    `tussock sweep` says. Raises InputError where another sweep writes to the folder, and where runs could not be finished: all others
+    are kept.
     """
     began = time.perf_counter()
     runs = {run_key(run): run for run in sweep.runs()}
@@ -53,21 +54,31 @@ def run_sweep(
                     workers,
                     lambda done: progress(len(runs) - len(missing) + done, len(runs)),
                 )
-            rows = {key: row for key, row in store.rows().items() if key in runs}
-            worst = worst_of(rows, record)
-            for key in worst:
-                record_again(runs[key], rows[key], out / WORST / key)
         except BaseException:
             with suppress(InputError):  # what ended the sweep matters more, a full disk above all
                 _write_table(store, out)
             raise
         path = _write_table(store, out)
+        rows = [row for key, row in store.rows().items() if key in runs]
     return {
         "table": str(path), "runs": len(runs), "done_before": len(runs) - len(missing),
-        "arrived": sum(row.get("arrived", False) for row in rows.values()),
-        "could_not_run": sum(row["error"] is not None for row in rows.values()),
-        "recordings": [str(out / WORST / key) for key in worst], "seconds": time.perf_counter() - began,
+        "arrived": sum(row.get("arrived", False) for row in rows), "could_not_run": sum(row["error"] is not None for row in rows),
+        "seconds": time.perf_counter() - began,
     }  # fmt: skip
+
+
+def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
+    """Keep recordings of so many of the worst runs of a finished sweep; returns their folders. Raises InputError as `record_again` does."""
+    runs = {run_key(run): run for run in sweep.runs()}
+    with Store(out) as store:
+        rows = {key: row for key, row in store.rows().items() if key in runs}
+        worst = worst_of(rows, count)
+        try:
+            for key in worst:
+                record_again(runs[key], rows[key], out / WORST / key)
+        finally:
+            _write_table(store, out)
+    return [out / WORST / key for key in worst]
 
 
 def _do(
@@ -84,7 +95,7 @@ def _do(
             kept = []
             for key, result in batch:
                 if isinstance(result, Walked | InputError):
-                    kept.append((key, row_of(missing[key], result), result.steps if isinstance(result, Walked) else ""))
+                    kept.append(finished_run(missing[key], key, result))
                 else:
                     unfinished.append((key, result))
             store.add(kept)
@@ -116,6 +127,7 @@ def _finished(client: Client, missing: dict[str, RunOptions]) -> Iterator[list[t
                 error = future.exception()
                 results.append((futures.pop(future), future.result() if error is None else error))
             except (CancelledError, CommClosedError) as gone:
+                yield results
                 raise InputError(
                     "the scheduler is gone; all runs that were finished are kept: give the same command again"
                 ) from gone
@@ -147,14 +159,15 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         yield client
 
 
-def row_of(run: RunOptions, result: Walked | InputError) -> dict[str, Any]:
-    """A run's row of the table."""
-    settings = {each.name: getattr(run, each.name) for each in dataclasses.fields(RunOptions)}
-    settings = {name: str(value) if isinstance(value, Path) else value for name, value in settings.items()}
+def finished_run(run: RunOptions, key: str, result: Walked | InputError) -> Finished:
+    """A run as it is kept. One whose world or lesson failed is tried again another time: what it lacked may be there then."""
+    settings, command = settings_of(run), command_of(run, key)
     if isinstance(result, InputError):
-        return settings | {"error": str(result), "command": command_of(run, run_key(run))}
-    times = {"seconds": result.seconds, "learn_seconds": result.learn_seconds}
-    return settings | result.found | {"error": None, "command": command_of(run, run_key(run))} | times
+        row = settings | {"error": str(result), "command": command}
+        return Finished(key=key, settings=settings, row=row, steps="", again=True)
+    times = {"seconds": result.seconds, "learn_seconds": result.learn_seconds} if result.refused is None else {}
+    row = settings | result.found | {"error": result.refused, "command": command} | times
+    return Finished(key=key, settings=settings, row=row, steps=result.steps)
 
 
 def command_of(run: RunOptions, key: str) -> str:
@@ -174,12 +187,16 @@ def _badness(row: dict[str, Any]) -> tuple:
 
 def record_again(run: RunOptions, row: dict[str, Any], out: Path) -> None:
     """Repeat a finished run with a recording, unless there is one. Raises InputError where it went another way."""
-    if (out / "summary.json").exists():
-        return
+    names, summary = ("arrived", "steps", "mean_deviation_m", "resets"), out / "summary.json"
+    if summary.exists():
+        found = json.loads(summary.read_text(encoding="utf-8"))
+        if all(found.get(name) == row[name] for name in names):
+            return
     settings = {each.name: getattr(run, each.name) for each in dataclasses.fields(RunOptions)}
     found = RunCommand(**settings, out=out, overwrite=True).run()
-    different = [name for name in ("arrived", "steps", "mean_deviation_m", "resets") if found[name] != row[name]]
+    different = [name for name in names if found[name] != row[name]]
     if different:
+        shutil.rmtree(out)
         raise InputError(
             f"{out}: repeated on this machine, the run went another way ({', '.join(different)}); its worker computes differently"
         )

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from render.renderer import Renderer, open_renderer
+from world.errors import InputError
 from world.geometry import Route
 from world.params import is_generated
 from world.scene import World
@@ -22,7 +23,7 @@ from ..options import PathOptions
 from ..threads import use_threads
 from ..trajectory import Trajectory
 
-VERSION = 2  # of what a run does: a change that alters what comes of one counts it up, and what was kept is done again
+VERSION = 3  # of what a run does: a change that alters what comes of one counts it up, and what was kept is done again
 _NOT_OF_PATH = {"size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg"}  # the eye's
 
 
@@ -39,8 +40,12 @@ class Taught:
 
 @dataclass(frozen=True, kw_only=True)
 class Walked:
-    """What came of a run. found: its numbers by name. steps: its trajectory as CSV. seconds: of the walk, and of the lesson before it."""
+    """What came of a run. found: its numbers by name. steps: its trajectory as CSV. seconds: of the walk, and of the lesson before it.
 
+    refused: why it has no start, where it has none; then nothing was found, nor ever will be.
+    """
+
+    refused: str | None = None
     found: dict[str, Any]
     steps: str
     seconds: float
@@ -76,9 +81,13 @@ def walk(options: RunOptions, taught: Taught) -> Walked:
     if options.threads is not None:
         use_threads(options.threads)
     agent, trajectory = options.agent(taught.renderer, taught.lesson), Trajectory()
-    for step in agent.walk(agent.start(options.offset_m)):
+    try:
+        start = agent.start(options.offset_m)
+    except InputError as error:
+        return Walked(refused=str(error), found={}, steps="", seconds=0.0, learn_seconds=taught.seconds)
+    for step in agent.walk(start):
         trajectory.add(step, taught.witness.evidence(step))
-    found: dict[str, Any] = trajectory.summary() | {"n_views": taught.n_views}
+    found: dict[str, Any] = trajectory.summary() | {"n_views": taught.n_views, "route_m": taught.lesson.route.length}
     found["memory_bytes"] = getattr(taught.lesson.model, "memory_bytes", None)
     causes = found.pop("causes")
     found |= {f"{label.replace(' ', '_')}_steps": causes.get(label, 0) for label in CAUSES}
@@ -99,6 +108,12 @@ def path_key(options: RunOptions) -> str:
 def lesson_key(options: RunOptions) -> str:
     """The same, of what its model learns."""
     return "lesson-" + _digest(options, {each.name for each in dataclasses.fields(LearningOptions)})
+
+
+def settings_of(options: RunOptions) -> dict[str, Any]:
+    """The settings of a run as its row of the table has them."""
+    settings = {each.name: getattr(options, each.name) for each in dataclasses.fields(RunOptions)}
+    return {name: str(value) if isinstance(value, Path) else value for name, value in settings.items()}
 
 
 def options_of(row: dict[str, Any]) -> RunOptions:
