@@ -3,7 +3,7 @@
 import string
 from datetime import date
 
-from fuzzing import FOLDER, answer, damaged, holds, main
+from fuzzing import FOLDER, NUMBERS, answer, damaged, holds, main
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -33,7 +33,9 @@ scalars = (
     | st.text(max_size=5)
 )
 keys = st.sampled_from([*SETTINGS, "from", "to", "step", "count", "title", "offset-m"])
-values = st.recursive(
+numbers = st.integers(-3, 3) | st.floats() | st.sampled_from([*NUMBERS, -(2**63), 10**400, 1e308, -1e308, 5e-324])
+ranges = st.fixed_dictionaries({"from": numbers, "to": numbers}, optional={"step": numbers, "count": numbers})
+values = ranges | st.recursive(
     scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(keys, inner, max_size=3), max_leaves=6
 )
 
@@ -77,7 +79,7 @@ def any_bytes(data):
 
 
 @holds(300)
-@given(st.dictionaries(keys, values, max_size=2), st.dictionaries(keys, values, min_size=1, max_size=2))
+@given(st.dictionaries(keys, values, max_size=2), st.dictionaries(keys, values, min_size=1, max_size=4))
 def any_values(fixed, axes):
     lines = ["[fixed]", *(f"{key} = {toml(value)}" for key, value in fixed.items())]
     lines += ["[axes]", *(f"{key} = {toml(value)}" for key, value in axes.items())]

@@ -276,9 +276,8 @@ evidences = st.builds(
 
 
 @given(evidences)
-def test_a_cause_is_a_function_of_the_evidence(evidence):
+def test_left_and_right_have_the_same_cause(evidence):
     assert cause(evidence) in CAUSES
-    assert cause(evidence) == cause(dataclasses.replace(evidence))
     assert cause(evidence) == cause(dataclasses.replace(evidence, error=-evidence.error))
     assert in_words(evidence).startswith(cause(evidence))
 
@@ -449,5 +448,6 @@ def test_a_wall_covers_what_is_within_the_distance(double_sided):
 
 
 def test_the_ground_is_no_occluder():
-    assert covered_within(world_of(np.empty((0, 3, 3)), np.empty((0, 3))), EYE, Pose(0.0, 0.0, 0.0), 1.0) == 0
-    assert FIELD.contains(0.0, 0.0)
+    world = world_of(np.empty((0, 3, 3)), np.empty((0, 3)))
+    assert len(world.surfaces()[0])  # there is ground, nearer than that
+    assert covered_within(world, EYE, Pose(0.0, 0.0, 0.0), 1.0) == 0
