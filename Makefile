@@ -14,8 +14,8 @@ run: $(VENV)/installed  ## install, grow a world, learn a route, walk it home, s
 	@echo "    $(BIN)/tussock play run          (a window)"
 	@echo "    $(BIN)/tussock play run --web    (a browser, where there is no display)"
 
-test: $(VENV)/developer  ## all tests
-	$(BIN)/pytest
+test: $(VENV)/developer  ## all tests, on all cores
+	$(BIN)/pytest -n auto --dist loadfile
 
 lint: $(VENV)/developer  ## style, types, and which room may know which
 	$(BIN)/ruff check .
