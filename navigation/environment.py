@@ -4,12 +4,14 @@ Importing this module registers it. Nothing else here needs Gymnasium, which is 
 """
 
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from world.errors import InputError
 
+from .rules import check_count
 from .task import RouteTask, Walk
 
 try:
@@ -42,9 +44,9 @@ class RouteFollowing(gymnasium.Env):
         self.observation_space, self.action_space = _spaces(self.task)
         self._walk = Walk(self.task)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: int | np.integer | None = None, options: dict[str, Any] | None = None):
         """Begin another walk; options: world and start, see `Walk.begin`."""
-        super().reset(seed=seed)
+        super().reset(seed=_seed(seed))
         info = self._walk.begin(self.np_random, options)
         return self._look(), info
 
@@ -80,8 +82,7 @@ class RouteFollowingVector(VectorEnv):
         self, num_envs: int = 1, *, render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP, **settings: Any,
     ):  # fmt: skip
-        if num_envs < 1:
-            raise InputError(f"{num_envs} environments; give at least 1")
+        check_count("environments", num_envs)
         self.task, self.num_envs = RouteTask(**settings), num_envs
         self.render_mode, self._autoreset = _render_mode(render_mode), AutoresetMode(autoreset_mode)
         self.metadata = RouteFollowing.metadata | {"autoreset_mode": self._autoreset}
@@ -95,19 +96,23 @@ class RouteFollowingVector(VectorEnv):
         self._ended = np.zeros(num_envs, bool)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+        self, *, seed: int | np.integer | Sequence[int | np.integer | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:  # fmt: skip
         """Begin other walks: all, or those where options["reset_mask"] says so. A seed s is s, s + 1, ... for the walks."""
-        if seed is None or isinstance(seed, int):
-            seed = [None if seed is None else seed + k for k in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise InputError(f"{len(seed)} seeds for {self.num_envs} environments; give one for each")
+        if isinstance(seed, Sequence):
+            seeds = [_seed(each) for each in seed]
+        else:
+            first = _seed(seed)
+            seeds = [None if first is None else first + k for k in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise InputError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each")
         options = dict(options or {})
         rows = np.flatnonzero(self._mask(options.pop("reset_mask", np.ones(self.num_envs, bool))))
         infos: dict[str, Any] = {}
         for k in rows.tolist():
-            if seed[k] is not None:
-                self._randoms[k] = np_random(seed[k])[0]
+            if seeds[k] is not None:
+                self._randoms[k] = np_random(seeds[k])[0]
             infos = self._add_info(infos, self._walks[k].begin(self._randoms[k], options), k)
         self._ended[rows] = False
         self._look(rows)
@@ -115,12 +120,12 @@ class RouteFollowingVector(VectorEnv):
 
     def step(self, actions: np.ndarray):
         """Turn, step and look, all of them; those that have ended begin another walk, as Gymnasium's autoreset modes have it."""
-        if np.shape(actions) != self.action_space.shape:
-            raise InputError(f"actions of shape {np.shape(actions)}; give {self.action_space.shape}")
+        begins = self._ended & (self._autoreset == AutoresetMode.NEXT_STEP)
+        self._check(actions, np.flatnonzero(~begins))
         rewards, terminations, truncations = np.zeros(self.num_envs), *np.zeros((2, self.num_envs), bool)
         each: list[dict[str, Any]] = []
         for k, walk in enumerate(self._walks):
-            if self._ended[k] and self._autoreset == AutoresetMode.NEXT_STEP:
+            if begins[k]:
                 each.append(walk.begin(self._randoms[k], None))
             else:
                 rewards[k], terminations[k], truncations[k], info = walk.step(actions[k])
@@ -141,6 +146,17 @@ class RouteFollowingVector(VectorEnv):
 
     def _look(self, rows: np.ndarray) -> None:
         self._observations[rows], self._views[rows] = self.task.observe([self._walks[k] for k in rows])
+
+    def _check(self, actions: np.ndarray, rows: np.ndarray) -> None:
+        """Refuse actions before any of these walks has moved. Raises InputError."""
+        try:
+            shape = np.shape(actions)
+        except ValueError as error:
+            raise InputError(f"actions: {error}; give an array of shape {self.action_space.shape}") from error
+        if shape != self.action_space.shape:
+            raise InputError(f"actions of shape {shape}; give {self.action_space.shape}")
+        for k in rows.tolist():
+            self._walks[k].check(actions[k])
 
     def _mask(self, mask: np.ndarray) -> np.ndarray:
         if np.shape(mask) != (self.num_envs,) or np.asarray(mask).dtype != bool or not np.any(mask):
@@ -169,6 +185,15 @@ def _spaces(task: RouteTask) -> tuple[Box, Box]:
         shape, low, high = task.chain.bounds(eye.height, eye.width)
         seen = Box(low * (1 + ROUNDING), high * (1 + ROUNDING), shape, np.float32)
     return seen, Box(np.array([-1, 0], np.float32), np.array([1, 1], np.float32))
+
+
+def _seed(seed: Any) -> int | None:
+    """A seed as Gymnasium takes it, which knows Python's own whole numbers only. Raises InputError for what is none."""
+    if seed is None:
+        return None
+    if not isinstance(seed, Integral) or int(seed) < 0:
+        raise InputError(f"the seed is {seed!r}; give a whole number >= 0")
+    return int(seed)
 
 
 def _render_mode(mode: str | None) -> str | None:

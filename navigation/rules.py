@@ -1,6 +1,7 @@
 """When a walk along a route ends, whoever walks it: an agent with a familiarity model, or a learner in the Gymnasium environment."""
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from world.errors import InputError
 from world.geometry import Bounds, Pose, Route
 
+NUMBER = int | float | np.integer | np.floating
 # Why a walk ends. The first is success.
 ARRIVED, LOST, STUCK, OUT_OF_WORLD, OUT_OF_STEPS = (
     "arrived",
@@ -60,20 +62,30 @@ def check_limits(limits: Any) -> None:
     """Refuse limits of a walk, fields of `Rules` by name, that make no sense. Raises InputError."""
     for name in ("step_length", "arrive", "lost", "patience"):
         check_distance(name, getattr(limits, name))
-    if limits.max_steps is not None and limits.max_steps < 1:
-        raise InputError(f"at most {limits.max_steps} steps; give at least 1")
+    if limits.max_steps is not None:
+        check_count("steps", limits.max_steps)
 
 
-def check_distance(name: str, value: float) -> None:
+def check_distance(name: str, value: Any) -> None:
     """Refuse what is no distance over 0. Raises InputError."""
-    if not (np.isfinite(value) and value > 0):
+    if not (isinstance(value, NUMBER) and 0 < value < np.inf):
         raise InputError(f"{name.replace('_', ' ')} {value} m; give a finite distance over 0")
 
 
-def check_noise(noise: float) -> None:
+def check_noise(noise: Any) -> None:
     """Refuse what is no standard deviation of headings (rad). Raises InputError."""
-    if not (np.isfinite(noise) and noise >= 0):
+    if not isinstance(noise, NUMBER):
+        raise InputError(f"heading noise {noise!r}; give a number")
+    if not 0 <= noise < np.inf:
         raise InputError(f"heading noise {np.degrees(noise):g} degrees; give 0 or more")
+
+
+def check_count(what: str, value: Any) -> None:
+    """Refuse what is no whole number of at least 1. Raises InputError."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise InputError(f"{value!r} {what}; give a whole number")
+    if int(value) < 1:
+        raise InputError(f"{value} {what}; give at least 1")
 
 
 class Progress:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,36 @@ from render.eye import Eye
 from render.renderer import Renderer, open_renderer
 from world.errors import InputError
 from world.files import open_world, read_route
+from world.generate import seeded
 from world.geometry import Pose, Route
 from world.params import is_generated
 from world.scene import World
 from world.walk import check_route, generate_route
 
 from .encoding import Encoding
-from .rules import ARRIVED, OUT_OF_STEPS, Progress, Rules, check_noise
+from .rules import (
+    ARRIVED,
+    NUMBER,
+    OUT_OF_STEPS,
+    Progress,
+    Rules,
+    check_count,
+    check_distance,
+    check_limits,
+    check_noise,
+)
 from .training import training_poses, training_views
 
 EYE = Eye(width=90, height=25)  # a pixel is 4 degrees wide and 3 high
 ARRIVAL = 1.0  # m; what arriving earns on top of the way: who passes the goal to the side has come as far
+
+# What settings may be, and how to say so.
+KINDS = {
+    "world": (str | os.PathLike | World, "a preset's name, a file or a World"),
+    "route": (Route | str | os.PathLike | None, "a Route or its file"),
+    "eye": (Eye, "an Eye"),
+    "encoding": (Encoding | str | None, "its name or its steps"),
+}
 
 Observations = np.ndarray  # (n, height, width, 3) uint8, or (n, h, w) float32
 Outcome = tuple[float, bool, bool, dict[str, Any]]  # reward, terminated, truncated, info
@@ -69,11 +89,16 @@ class RouteTask:
     _courses: dict[int, Course] = dataclasses.field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self):
-        if self.worlds < 1:
-            raise InputError(f"{self.worlds} worlds; give at least 1")
+        for name, (kinds, wanted) in KINDS.items():
+            if not isinstance(getattr(self, name), kinds):
+                raise InputError(f"the {name} is {getattr(self, name)!r}; give {wanted}")
+        check_count("worlds", self.worlds)
+        seeded(self.world_seed)  # refuses what is no seed
         if self.worlds > 1 and not (isinstance(self.world, str) and is_generated(self.world) and self.route is None):
             raise InputError(f"{self.worlds} worlds are grown from a preset, with a route each; give one, and no route")
-        if not (np.isfinite(self.offset) and 0 <= self.offset < self.lost):
+        check_limits(self)
+        check_distance("length", self.length)
+        if not (isinstance(self.offset, NUMBER) and 0 <= self.offset < self.lost):
             raise InputError(
                 f"an offset of {self.offset} m; give 0 or more, and less than {self.lost} m, which is lost"
             )
@@ -162,14 +187,13 @@ class Walk:
         seeds = range(task.world_seed, task.world_seed + task.worlds)
         if seed is None:
             seed = seeds[int(random.integers(len(seeds)))]
-        elif seed not in seeds:
+        elif not isinstance(seed, Integral) or seed not in seeds:
             raise InputError(f"world {seed!r}; give a seed from {seeds[0]} to {seeds[-1]}, or ask for more worlds")
-        rules = task.course(seed).rules
+        rules = task.course(int(seed)).rules
         if start is None:
-            start = rules.route.start.moved(0.0, random.uniform(-task.offset, task.offset))
-        elif len(start) != 3:
-            raise InputError(f"start {start}; give x (m), y (m) and heading (rad)")
-        pose = Pose(*(float(number) for number in start))
+            pose = rules.route.start.moved(0.0, random.uniform(-task.offset, task.offset))
+        else:
+            pose = Pose(*_numbers("start", start, 3, "x (m), y (m) and heading (rad)"))
         rules.check_inside(pose)
         self.seed, self.rules, self.pose, self.index, self.progress = int(seed), rules, pose, 0, Progress(rules)
         self.random = random
@@ -178,14 +202,19 @@ class Walk:
             raise InputError(f"a walk that starts at {tuple(self.pose)} is {self.reason} at once; choose another start")
         return info
 
-    def step(self, action: np.ndarray) -> Outcome:
-        """Turn and step: action (2,) is the turn to the left, as a share of half a turn, -1 to 1, and the step's, 0 to 1."""
+    def check(self, action: Any) -> tuple[float, float]:
+        """The turn and step of an action. Raises InputError for what is none, and where the walk is over."""
         if self.reason is not None:
             raise InputError(f"this walk is {self.reason}; reset the environment to begin another one")
-        values = np.asarray(action, dtype=np.float64)
-        if values.shape != (2,) or not (-1 <= values[0] <= 1 and 0 <= values[1] <= 1):
-            raise InputError(f"action {values.tolist()}; give a turn from -1 to 1 and a step from 0 to 1")
-        turn, share = values.tolist()
+        wanted = "a turn from -1 to 1 and a step from 0 to 1"
+        turn, share = _numbers("action", action, 2, wanted)
+        if not (-1 <= turn <= 1 and 0 <= share <= 1):
+            raise InputError(f"action {[turn, share]}; give {wanted}")
+        return turn, share
+
+    def step(self, action: Any) -> Outcome:
+        """Turn and step: action (2,) is the turn to the left, as a share of half a turn, -1 to 1, and the step's, 0 to 1."""
+        turn, share = self.check(action)
         turn *= np.pi
         if self.task.heading_noise:
             turn += self.task.heading_noise * self.random.standard_normal()
@@ -206,3 +235,14 @@ class Walk:
             "pose": np.array(self.pose), "deviation_m": float(deviation), "along_m": self.along, "world": self.seed,
             "reason": self.reason, "is_success": self.reason == ARRIVED,
         }  # fmt: skip
+
+
+def _numbers(what: str, given: Any, count: int, wanted: str) -> list[float]:
+    """What is given, as so many numbers. Raises InputError."""
+    try:
+        values = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{what}: {error}; give {wanted}") from error
+    if values.shape != (count,):
+        raise InputError(f"{what} {values.tolist()}; give {wanted}")
+    return values.tolist()

@@ -215,7 +215,7 @@ def test_the_bounds_of_an_encoding_are_reached(chain):
         (AHEAD, {}, ARRIVED, 37),
         (LEFT, {"step_length": 0.3, "lost": 0.29}, LOST, 1),
         # A quarter turn at every step is a square: it gets no farther along than in its first four steps.
-        (LEFT, {"step_length": 0.3, "patience": 2.1}, STUCK, None),
+        (LEFT, {"step_length": 0.3, "patience": 2.1}, STUCK, 7),
         (LEFT, {"step_length": 0.3, "max_steps": 5}, OUT_OF_STEPS, 5),
         (STAY, {}, OUT_OF_STEPS, 120),
         (AHEAD, {"arrive": 0.001, "step_length": 0.07, "lost": 1.0}, OUT_OF_WORLD, 36),
@@ -229,7 +229,7 @@ def test_walks_end_for_the_reason_they_should(made, action, settings, reason, st
         _, reward, terminated, truncated, info = env.step(np.array(action))
         total, walked, ended = total + reward, walked + 1, terminated or truncated
     assert info["reason"] == reason
-    assert walked == (steps or walked)
+    assert walked == steps
     assert (terminated, truncated) == (reason != OUT_OF_STEPS, reason == OUT_OF_STEPS)
     assert info["is_success"] == (reason == ARRIVED)
     assert np.isclose(total, info["along_m"] + ARRIVAL * info["is_success"])
@@ -309,6 +309,32 @@ def test_settings_that_make_no_sense_are_refused(made, settings, match):
     assert "\n" not in str(refused.value)
 
 
+# Settings of the wrong type, which the tests' own type checker would refuse first: elsewhere there is none.
+ILL_TYPED = {
+    "max_steps=1.5": "1.5 steps; give a whole number",
+    "worlds=2.5": "2.5 worlds; give a whole number",
+    "worlds=True": "True worlds; give a whole number",
+    "world_seed=1.5": "the seed is 1.5; give a whole number >= 0",
+    "world=5": "the world is 5; give a preset's name, a file or a World",
+    "route=5": "the route is 5; give a Route or its file",
+    "eye=None": "the eye is None; give an Eye",
+    "encoding=5": "the encoding is 5; give its name or its steps",
+    "offset='far'": "an offset of far m; give 0 or more, and less than 0.5 m, which is lost",
+    "lost='far'": "lost far m; give a finite distance over 0",
+    "length='long'": "length long m; give a finite distance over 0",
+    "heading_noise=None": "heading noise None; give a number",
+}
+
+
+def test_settings_of_the_wrong_type_are_refused():
+    cases = "\n".join(
+        f"try: RouteFollowing({case}).reset()\nexcept InputError as error: print(error)" for case in ILL_TYPED
+    )
+    code = f"from navigation.environment import RouteFollowing\nfrom world.errors import InputError\n{cases}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.splitlines() == list(ILL_TYPED.values()), done.stderr
+
+
 @pytest.mark.parametrize(
     ("options", "match"),
     [
@@ -317,14 +343,24 @@ def test_settings_that_make_no_sense_are_refused(made, settings, match):
         ({"start": (1.0, 2.0)}, "heading"),
         ({"start": (9.0, 2.0, 0.0)}, "outside the world"),
         ({"start": (1.0, 2.9, 0.0)}, "lost at once"),
+        ({"start": 5}, "start 5.0; give x"),
+        ({"start": "abc"}, "start: .*'abc'; give x"),
+        ({"start": (None, 0, 0)}, "outside the world"),
+        ({"start": (10**400, 0, 0)}, "start: .*give x"),
+        ({"world": np.zeros(2, int)}, "give a seed from 0 to 0"),
+        ({"world": 0.0}, "world 0.0; give a seed"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(made, options, match):
-    with pytest.raises(InputError, match=match):
+    with pytest.raises(InputError, match=match) as refused:
         made(route=STRAIGHT).reset(options=options)
+    assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("action", [(1.1, 0.5), (0.0, -0.1), (np.nan, 1.0), (0.5,)])
+@pytest.mark.parametrize(
+    "action",
+    [(1.1, 0.5), (0.0, -0.1), (np.nan, 1.0), (0.5,), "ab", None, ("a", "b"), np.array([0.5, [1.0]], dtype=object)],
+)
 def test_actions_that_make_no_sense_are_refused(made, action):
     env, many = made(), made(RouteFollowingVector, 2)
     with pytest.raises(InputError, match="not begun"):
@@ -335,6 +371,51 @@ def test_actions_that_make_no_sense_are_refused(made, action):
         env.step(np.array(action))
     with pytest.raises(InputError, match="action"):
         many.step(np.array([action, action]))
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+@pytest.mark.parametrize("bad", [(0.0, 2.0), ("a", "b")])
+def test_a_refused_step_changes_nothing(made, mode, bad):
+    """Nor is an action refused that is not used, of a walk that has ended and is to begin another one."""
+    many, other = (made(RouteFollowingVector, 2, autoreset_mode=mode, max_steps=2) for _ in range(2))
+    for each in (many, other):
+        each.reset(seed=1)
+        each.step(np.array([AHEAD, AHEAD]))
+    actions = np.array([AHEAD, bad], dtype=object)
+    for action in (actions, actions[:, :1]):
+        with pytest.raises(InputError, match="action"):
+            many.step(action)
+    assert data_equivalence(many.step(np.array([AHEAD, LEFT])), other.step(np.array([AHEAD, LEFT])), exact=True)
+    if mode == AutoresetMode.NEXT_STEP:
+        assert not many.step(np.array([bad, bad], dtype=object))[3].any()
+    elif mode == AutoresetMode.DISABLED:
+        many.reset(options={"reset_mask": np.array([True, False])})
+        before = [walk.pose for walk in many._walks]
+        with pytest.raises(InputError, match="reset the environment"):
+            many.step(np.array([AHEAD, AHEAD]))
+        assert [walk.pose for walk in many._walks] == before
+
+
+def test_seeds_may_be_numpys(made):
+    env, many = made(), made(RouteFollowingVector, 2)
+    for seed in (np.int64(3), np.uint8(3)):
+        assert data_equivalence(env.reset(seed=seed), env.reset(seed=3), exact=True)
+        assert data_equivalence(many.reset(seed=seed), many.reset(seed=[3, 4]), exact=True)
+        assert data_equivalence(many.reset(seed=[seed, seed]), many.reset(seed=[3, 3]), exact=True)
+    for each in (env, many):
+        with pytest.raises(InputError, match="the seed is -1; give a whole number"):
+            each.reset(seed=-1)
+
+
+def test_only_the_noise_of_a_walk_is_left_to_chance_where_world_and_start_are_given(made):
+    """It is drawn as an agent draws it, which draws nothing else."""
+    env = made(world="tiny", worlds=3, heading_noise=0.3)
+    start = env.task.course(1).rules.route.start
+    for seed in (5, 6):
+        _, info = env.reset(seed=seed, options={"world": 1, "start": start})
+        assert (info["world"], *info["pose"]) == (1, *start)
+        turned = env.step(np.array(STAY))[4]["pose"][2] - start.heading
+        assert np.isclose(np.cos(turned - 0.3 * np.random.default_rng(seed).standard_normal()), 1.0)
 
 
 def test_vectors_that_make_no_sense_are_refused(made):
