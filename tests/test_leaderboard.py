@@ -263,6 +263,65 @@ def test_what_is_no_result_is_refused(entered, tmp_path):
         read_result(entered[1], {TINY.name: dataclasses.replace(TINY, noises_deg=(0.0, 10.0))})
 
 
+HUGE = 10**400  # json reads it; a float cannot hold it
+
+
+@pytest.mark.parametrize(
+    ("said", "match"),
+    [
+        ({"runs": []}, "no runs"),
+        ({"runs": 3}, "runs is 3"),
+        ({"runs": [3]}, "no result"),
+        ({"entry": 5}, "entry is 5"),
+        ({"entry": "two\nlines"}, "entry 'two.+nlines' cannot be printed"),
+        ({"benchmark": None}, "benchmark is None"),
+        ({"tussock": ["0"]}, "tussock is "),
+        ({"memory_bytes": "x"}, "memory_bytes is 'x'"),
+        ({"memory_bytes": True}, "memory_bytes is True"),
+        ({"memory_bytes": HUGE}, "memory_bytes is too large"),
+        ({"times": {"learn_seconds": "long"}}, "learn_seconds is 'long'"),
+        ({"times": None}, "no result"),
+    ],
+)
+def test_what_is_of_the_wrong_kind_in_a_result_is_refused(tmp_path, said, match):
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(json.loads(made_up("it", line()).to_json()) | said))
+    _is_refused(path, match)
+
+
+@pytest.mark.parametrize(
+    ("found", "match"),
+    [
+        ({"arrived": HUGE}, "arrived is 1000"),
+        ({"arrived": 1}, "arrived is 1"),
+        ({"mean_deviation_m": HUGE}, "mean_deviation_m is too large"),
+        ({"mean_deviation_m": float("inf")}, "mean_deviation_m is inf"),
+        ({"mean_deviation_m": None}, "no result"),
+        ({"seed": [1]}, "seed is "),
+        ({"heading_noise_deg": "much"}, "heading_noise_deg is 'much'"),
+        ({"world": 3}, "world is 3"),
+        ({"poor_steps": "few"}, "poor_steps is 'few'"),
+    ],
+)
+def test_what_is_of_the_wrong_kind_in_a_run_is_refused(tmp_path, found, match):
+    said = json.loads(made_up("it", line(), line(offset=0.1)).to_json())
+    said["runs"][1] |= found
+    (tmp_path / "bad.json").write_text(json.dumps(said))
+    _is_refused(tmp_path / "bad.json", match)
+
+
+def _is_refused(path, match):
+    with pytest.raises(InputError, match=match) as refused:
+        read_result(path)
+    assert "\n" not in str(refused.value)
+    assert str(path) in str(refused.value)
+
+
+def test_a_folder_is_no_result(tmp_path):
+    (tmp_path / "bad.json").mkdir()
+    _is_refused(tmp_path / "bad.json", "no result")
+
+
 @pytest.mark.parametrize(
     ("flags", "match"),
     [

@@ -18,11 +18,21 @@ from ..learning_options import RunOptions
 from ..sweeps.statistics import mean_interval
 from .definition import BENCHMARKS, Benchmark
 
-SET = ("world", "seed", "heading_noise_deg", "offset_m")  # what tells the runs of an entry apart
-FOUND = ("arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "poor_steps", "cause", "error")
+Kinds = Mapping[str, Any]  # what values may be, by their names
+NUMBER = int | float
+HEAD: Kinds = {
+    "benchmark": str, "entry": str, "encoding": str, "tussock": str, "runs": list, "memory_bytes": int | None, "times": dict,
+}  # fmt: skip
+# Of a run: what was asked, which tells the runs of an entry apart, and what was found.
+ASKED: Kinds = {"world": str, "seed": int, "heading_noise_deg": NUMBER, "offset_m": NUMBER}
+FOUND: Kinds = {
+    "arrived": bool, "reason": str | None, "steps": int | None, "mean_deviation_m": NUMBER | None,
+    "max_deviation_m": NUMBER | None, "poor_steps": int | None, "cause": str | None, "error": str | None,
+}  # fmt: skip
 TIMES = ("learn_seconds", "walk_seconds")
+LARGEST = 2**63  # numbers of a result are smaller
 
-Line = dict[str, Any]  # of a run: SET and FOUND by name; None for what is not known
+Line = dict[str, Any]  # of a run: ASKED and FOUND by name; None for what is not known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +102,7 @@ def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
 
 def line_of(run: RunOptions, found: Mapping[str, Any]) -> Line:
     """The line of a run, of what was found by name. Who could not run has not arrived."""
-    line = {name: getattr(run, name) for name in SET} | {name: found.get(name) for name in FOUND}
+    line = {name: getattr(run, name) for name in ASKED} | {name: found.get(name) for name in FOUND}
     return line | {"arrived": bool(found.get("arrived"))}
 
 
@@ -117,8 +127,8 @@ def file_of(folder: Path, benchmark: Benchmark, entry: str, encoding: str) -> Pa
     """Where the result of an entry is kept. Raises InputError for a name of which no file can be named."""
     words = [entry] if encoding == benchmark.chain() else [entry, encoding]
     parts = [re.sub(r"[^a-z0-9.]+", "-", word.lower()).strip("-.") for word in words]
-    if not all(parts):
-        raise InputError(f"entry {entry!r}: give a name with letters in it")
+    if not (all(parts) and entry.isprintable()):
+        raise InputError(f"entry {entry!r}: give a name of one line with letters in it")
     return folder / f"{'-'.join(parts)}.json"
 
 
@@ -151,9 +161,15 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
     """Read a result. Raises InputError for what is none, and for one whose runs are not those of its benchmark, where it is known."""
     try:
         said = json.loads(path.read_text(encoding="utf-8"))
+        _check_kinds(said, HEAD)
+        _check_kinds(said["times"], dict.fromkeys(said["times"], NUMBER))
+        for run in said["runs"]:
+            _check_kinds(run, {**ASKED, **FOUND})
+        if not said["runs"]:
+            raise ValueError("no runs")
         result = Result(**{name: said[name] for name in Result.__dataclass_fields__})
         scores = json.loads(json.dumps(result.scores()))
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is no result of tussock benchmark ({error!r}); make it again") from error
     if any(scores[name] != said.get(name) for name in scores):
         raise InputError(f"{path}: its totals do not follow from its runs; make it again")
@@ -162,9 +178,21 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
     return result
 
 
+def _check_kinds(values: Mapping[str, Any], kinds: Kinds) -> None:
+    """Raises ValueError where a value is not of its kind, LookupError where it is not there."""
+    for name, kind in kinds.items():
+        value = values[name]
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise ValueError(f"{name} is {value!r}")
+        if isinstance(value, NUMBER) and not abs(value) < LARGEST:  # nor is nan
+            raise ValueError(f"{name} is {value}" if isinstance(value, float) else f"{name} is too large")
+        if isinstance(value, str) and kind is str and not value.isprintable():
+            raise ValueError(f"{name} {value!r} cannot be printed")
+
+
 def _check_runs(path: Path, result: Result, benchmark: Benchmark) -> None:
-    asked = [tuple(getattr(run, name) for name in SET) for runs in benchmark.by_world() for run in runs]
-    if [tuple(run[name] for name in SET) for run in result.runs] != asked:
+    asked = [tuple(getattr(run, name) for name in ASKED) for runs in benchmark.by_world() for run in runs]
+    if [tuple(run[name] for name in ASKED) for run in result.runs] != asked:
         raise InputError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
 
 
