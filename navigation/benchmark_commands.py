@@ -19,13 +19,13 @@ class BenchmarkCommand:
     model: str | None = None
     """all, or names separated by commas (see tussock models), after which their parameters may follow."""
     out: Path = Path("benchmark")
-    """Folder for the results; runs that are finished there are not done again."""
+    """Folder for the runs and, in its folder results, what comes of them; runs that are finished there are not done again."""
     encoding: str = "edges"
     """What the models see of a view: edges, grey or sky, or a chain of steps. The eye is the test bed's."""
     quick: bool = False
     """A first look: other, fewer runs, whose results compare with no others."""
     leaderboard: Path | None = None
-    """Only print the table of the results in this folder."""
+    """Only print the table of the results in this folder, an --out or one of results alone."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this command alone."""
     workers: int | None = None

@@ -20,6 +20,7 @@ from navigation.cli import main
 from navigation.learning_options import RunOptions
 from navigation.models import PerfectMemory, make_model
 from navigation.rotation import best_turn, scan_window
+from navigation.sweeps.report import write_sweep_report
 from navigation.sweeps.work import teach, walk
 from world.errors import InputError
 
@@ -115,7 +116,7 @@ def test_its_runs_are_all_combinations_and_each_is_sound():
 def test_a_result_says_what_came_of_it(entered):
     result, path = entered
     said = json.loads(path.read_text())
-    assert path.name == "perfect-memory.json"
+    assert (path.parent.name, path.name) == ("results", "perfect-memory.json")
     assert (said["benchmark"], said["entry"]) == ("tiny-1", "perfect-memory")
     assert said["encoding"] == "sky-mask | vertical-edges | normalise"
     assert said["memory_bytes"] > 0
@@ -237,7 +238,8 @@ def test_the_interval_is_over_worlds_not_over_runs():
 
 
 def test_results_of_another_version_are_not_replaced(entered, tmp_path):
-    path = Path(shutil.copy(entered[1], tmp_path))
+    (tmp_path / "results").mkdir()
+    path = Path(shutil.copy(entered[1], tmp_path / "results"))
     before = path.read_bytes()
     for other in (dataclasses.replace(TINY, name="tiny-2"), dataclasses.replace(TINY, name="tiny-1-quick")):
         with pytest.raises(InputError, match=r"holds a result of tiny-1 .+ give another --out"):
@@ -247,6 +249,36 @@ def test_results_of_another_version_are_not_replaced(entered, tmp_path):
     with pytest.raises(InputError, match="Perfect memory"):  # another entry, whose file would have this name
         enter(lambda seed: make_model("random", seed=seed), "Perfect memory", tmp_path, benchmark=TINY)
     assert path.read_bytes() == before
+
+
+def test_what_does_not_compare_is_refused_before_the_first_run(tmp_path, monkeypatch):
+    def run_none(*given, **settings):
+        raise AssertionError("a run has begun")
+
+    monkeypatch.setattr("navigation.benchmark.models.run_sweep", run_none)
+    monkeypatch.setattr("navigation.benchmark.models.teach", run_none)
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "it.json").write_text(made_up("it", line()).to_json())
+    refusal = r"it\.json holds a result of made-up-1 .+ this would be one of tussock-1.+; give another --out"
+    for quick in (False, True):
+        with pytest.raises(InputError, match=refusal):
+            BenchmarkCommand(model="random", out=tmp_path, quick=quick).run()
+    with pytest.raises(InputError, match="one of tiny-1"):
+        enter(lambda seed: make_model("random", seed=seed), "other", tmp_path, benchmark=TINY)
+    (tmp_path / "results" / "it.json").write_text("{}")
+    with pytest.raises(InputError, match="no result"):
+        enter(lambda seed: make_model("random", seed=seed), "other", tmp_path, benchmark=TINY)
+
+
+def test_a_report_of_the_runs_and_any_name_of_an_entry_are_not_in_the_way(entered, tmp_path):
+    out = shutil.copytree(entered[1].parents[1], tmp_path / "out")
+    enter(lambda seed: make_model("random", seed=seed), "results", out, benchmark=TINY)
+    assert write_sweep_report(out, worst=0)["runs"] == len(TINY)
+    assert (out / "report.json").exists()
+    enter(lambda seed: make_model("random", seed=seed), "report", out, benchmark=TINY)
+    names = ["perfect-memory", "report", "results"]
+    assert [result.entry for result in read_results(out)] == names
+    assert [result.entry for result in read_results(out / "results")] == names
 
 
 def test_what_is_no_result_is_refused(entered, tmp_path):
@@ -362,6 +394,13 @@ def test_versions_are_not_mixed(tmp_path):
     for name in ("one-1", "one-2"):
         (tmp_path / f"{name}.json").write_text(made_up("it", line(), benchmark=name).to_json())
     with pytest.raises(InputError, match="one-1 and one-2, which do not compare"):
+        read_results(tmp_path)
+
+
+def test_results_of_other_runs_under_one_name_are_not_mixed(tmp_path):
+    for name, noise in (("one", 0.0), ("two", 20.0)):
+        (tmp_path / f"{name}.json").write_text(made_up(name, line(noise=noise)).to_json())
+    with pytest.raises(InputError, match="made-up-1 whose runs are not the same"):
         read_results(tmp_path)
 
 

@@ -6,11 +6,16 @@ from pathlib import Path
 from world.errors import InputError
 
 from .definition import BENCHMARKS
-from .results import Result, read_result
+from .results import ASKED, RESULTS, Result, read_result
 
 
 def read_results(folder: Path) -> list[Result]:
-    """All results in a folder. Raises InputError where there are none, where a file is none, and for several versions."""
+    """All results in a folder, which may be one that tussock benchmark wrote, with the runs beside the results.
+
+    Raises InputError where there are none, where a file is none, and for several versions.
+    """
+    if (folder / RESULTS).is_dir():
+        folder = folder / RESULTS
     results = [read_result(path) for path in sorted(folder.glob("*.json"))]
     if not results:
         raise InputError(f"{folder} holds no results (*.json); give the folder that tussock benchmark wrote")
@@ -19,6 +24,8 @@ def read_results(folder: Path) -> list[Result]:
         raise InputError(
             f"{folder} holds results of {' and '.join(names)}, which do not compare; keep each in a folder of its own"
         )
+    if len({tuple(run[name] for run in result.runs for name in ASKED) for result in results}) > 1:
+        raise InputError(f"{folder} holds results of {names[0]} whose runs are not the same; make them again")
     return results
 
 

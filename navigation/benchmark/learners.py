@@ -41,7 +41,7 @@ def enter_learner(
     learn: Callable[[RouteFollowing], Act], name: str, out: Path, *, encoding: str | None = ENCODING,
     benchmark: Benchmark = BENCHMARK, progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> tuple[Result, Path]:  # fmt: skip
-    """Enter a learner, under a name; returns the result and its file, in the folder `out`.
+    """Enter a learner, under a name; returns the result and its file, in `out`/results.
 
     learn(env): called for each world with an environment there that is reset; what it may learn from is `env.training_views()`. It
     returns act(observation, look), which gives the action after each look; look 0 is the first of a walk. Raises InputError as

@@ -21,10 +21,10 @@ def enter_named(
     name: str, out: Path, *, encoding: str = ENCODING, benchmark: Benchmark = BENCHMARK, scheduler: str | None = None,
     workers: int | None = None, progress: Progress = lambda done, total: None,
 ) -> tuple[Result, Path]:  # fmt: skip
-    """Enter a model by its spelling: "mushroom-body inputs=10"; returns the result and its file, in the folder `out`.
+    """Enter a model by its spelling: "mushroom-body inputs=10"; returns the result and its file, in `out`/results.
 
-    Runs that are finished are kept there, as a sweep keeps them, and not done again. scheduler, workers: see `run_sweep`.
-    Raises InputError where that folder holds a result of another version or entry under the same name.
+    Runs that are finished are kept in `out`, as a sweep keeps them, and not done again. scheduler, workers: see `run_sweep`.
+    Raises InputError where there is a result of another version, or of another entry under the same name.
     """
     entry = checked_entry(name)
     sweep = benchmark.sweep(entry, encoding)
@@ -58,7 +58,7 @@ def enter(
     make: Callable[[int], FamiliarityModel], name: str, out: Path, *, encoding: str = ENCODING,
     benchmark: Benchmark = BENCHMARK, progress: Progress = lambda done, total: None,
 ) -> tuple[Result, Path]:  # fmt: skip
-    """Enter any familiarity model, under a name; returns the result and its file, in the folder `out`.
+    """Enter any familiarity model, under a name; returns the result and its file, in `out`/results.
 
     make(seed): a new, untrained model, called for each world with its seed. Runs follow one another in this process, on one thread
     of torch's. progress(done, total): runs. Raises InputError as `enter_named` does, and what the model raises.

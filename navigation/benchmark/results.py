@@ -30,6 +30,7 @@ FOUND: Kinds = {
     "max_deviation_m": NUMBER | None, "poor_steps": int | None, "cause": str | None, "error": str | None,
 }  # fmt: skip
 TIMES = ("learn_seconds", "walk_seconds")
+RESULTS = "results"  # the folder of the results, beside the runs, which are a sweep's with files of its own
 LARGEST = 2**63  # numbers of a result are smaller
 
 Line = dict[str, Any]  # of a run: ASKED and FOUND by name; None for what is not known
@@ -123,35 +124,39 @@ def result_of(
     )  # fmt: skip
 
 
-def file_of(folder: Path, benchmark: Benchmark, entry: str, encoding: str) -> Path:
+def file_of(out: Path, benchmark: Benchmark, entry: str, encoding: str) -> Path:
     """Where the result of an entry is kept. Raises InputError for a name of which no file can be named."""
     words = [entry] if encoding == benchmark.chain() else [entry, encoding]
     parts = [re.sub(r"[^a-z0-9.]+", "-", word.lower()).strip("-.") for word in words]
     if not (all(parts) and entry.isprintable()):
         raise InputError(f"entry {entry!r}: give a name of one line with letters in it")
-    return folder / f"{'-'.join(parts)}.json"
+    return out / RESULTS / f"{'-'.join(parts)}.json"
 
 
-def check_free(folder: Path, benchmark: Benchmark, entry: str, encoding: str) -> Path:
-    """Where a result may be written: nowhere yet, or over one of the same entry. Makes the folder. Raises InputError for another's."""
+def check_free(out: Path, benchmark: Benchmark, entry: str, encoding: str) -> Path:
+    """Where a result may be written: nowhere yet, or over one of the same entry. Makes the folder.
+
+    Raises InputError for another's, and where there are results that this one would not compare with.
+    """
+    path = file_of(out, benchmark, entry, encoding)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder} cannot be written ({error.strerror}); give another --out") from error
-    path = file_of(folder, benchmark, entry, encoding)
-    if path.exists():
-        there = read_result(path)
-        if (there.benchmark, there.entry, there.encoding) != (benchmark.name, entry, encoding):
+        raise InputError(f"{path.parent} cannot be written ({error.strerror}); give another --out") from error
+    for other in sorted(path.parent.glob("*.json")):
+        there = read_result(other)
+        mine = (there.entry, there.encoding) == (entry, encoding)
+        if there.benchmark != benchmark.name or (other == path and not mine):
             raise InputError(
-                f"{path} holds a result of {there.benchmark} ({there.entry}, {there.encoding}), and this would be one of "
+                f"{other} holds a result of {there.benchmark} ({there.entry}, {there.encoding}), and this would be one of "
                 f"{benchmark.name} ({entry}, {encoding}); give another --out"
             )
     return path
 
 
-def write_result(result: Result, folder: Path, benchmark: Benchmark) -> Path:
+def write_result(result: Result, out: Path, benchmark: Benchmark) -> Path:
     """Write the file of a result, replacing one of the same entry; returns its path."""
-    path = check_free(folder, benchmark, result.entry, result.encoding)
+    path = check_free(out, benchmark, result.entry, result.encoding)
     with replacing(path) as partial:
         partial.write_text(result.to_json(), encoding="utf-8", newline="")
     return path
