@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import FIELD, random_poses, random_world, world_of
+from scenes import random_poses, random_world, world_of
 
 from navigation import failures
 from navigation.agent import ARRIVED, LOST, Agent
