@@ -14,12 +14,10 @@ from ..sweeps.work import run_key, teach, walk
 from .definition import BENCHMARK, ENCODING, Benchmark
 from .results import Result, check_free, line_of, result_of, write_result
 
-Progress = Callable[[int, int], object]
-
 
 def enter_named(
     name: str, out: Path, *, encoding: str = ENCODING, benchmark: Benchmark = BENCHMARK, scheduler: str | None = None,
-    workers: int | None = None, progress: Progress = lambda done, total: None,
+    workers: int | None = None, progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> tuple[Result, Path]:  # fmt: skip
     """Enter a model by its spelling: "mushroom-body inputs=10"; returns the result and its file, in `out`/results.
 
@@ -56,7 +54,7 @@ def checked_entry(name: str) -> str:
 
 def enter(
     make: Callable[[int], FamiliarityModel], name: str, out: Path, *, encoding: str = ENCODING,
-    benchmark: Benchmark = BENCHMARK, progress: Progress = lambda done, total: None,
+    benchmark: Benchmark = BENCHMARK, progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> tuple[Result, Path]:  # fmt: skip
     """Enter any familiarity model, under a name; returns the result and its file, in `out`/results.
 

@@ -15,11 +15,11 @@ from world.errors import InputError
 from world.files import replacing
 
 from ..learning_options import RunOptions
+from ..rules import NUMBER
 from ..sweeps.statistics import mean_interval
 from .definition import BENCHMARKS, Benchmark
 
 Kinds = Mapping[str, Any]  # what values may be, by their names
-NUMBER = int | float
 HEAD: Kinds = {
     "benchmark": str, "entry": str, "encoding": str, "tussock": str, "runs": list, "memory_bytes": int | None, "times": dict,
 }  # fmt: skip

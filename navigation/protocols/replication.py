@@ -51,11 +51,9 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
             if row["error"] is None:
                 row |= protocol.of_walk(row, read_steps(store.steps(key)))
     errors = [_kind(row["error"]) for row in rows.values() if row["error"] is not None]
-    table = (
-        table_of({key: row for key, row in rows.items() if row["error"] is None}) if len(errors) < len(rows) else None
-    )
-    if table is None:
+    if len(errors) == len(rows):
         raise InputError(f"none of {len(rows)} runs could be made; the first: {errors[0]}")
+    table = table_of({key: row for key, row in rows.items() if row["error"] is None})
     models = [choice["model"] for choice in sweep.axes["model"]]
     check_walked(table, models)
     order = table["model"].map({model: k for k, model in enumerate(models)})
