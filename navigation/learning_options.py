@@ -37,8 +37,8 @@ class LearningOptions(RouteOptions):
     threads: int | None = None
     """Threads to draw, learn and match with. Default: one a core. What networks learn depends on it in its last digits."""
 
-    def open_renderer(self, world, threads: int | None = None):
-        return super().open_renderer(world, threads or self.threads)
+    def open_renderer(self, world):
+        return super().open_renderer(world, self.threads)
 
     def prepare(self, path: "tuple[World, Route] | None" = None) -> "Lesson":
         """Everything that a model is to learn, and everything that can be refused before long work begins.
