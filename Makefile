@@ -39,6 +39,7 @@ $(VENV)/installed: pyproject.toml constraints.txt
 
 $(VENV)/developer: $(VENV)/installed
 	$(PIP) -e '.[dev]'
+	mkdir -p $(VENV)/clone && ln -sfn ../.. $(VENV)/clone/tussock  # where pyright finds the package
 	touch $@
 
 clean:

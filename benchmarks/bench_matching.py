@@ -4,8 +4,8 @@ import naive
 import pytest
 import torch
 
-from navigation import Infomax, PerfectMemory
-from navigation.models.infomax import infomax_update
+from tussock.navigation import Infomax, PerfectMemory
+from tussock.navigation.models.infomax import infomax_update
 
 
 def noise(n: int, height: int, width: int, seed: int = 0) -> torch.Tensor:

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import worlds
 
-from render import Eye, open_renderer
-from render.database_writing import Grid, published_part, write_database
-from world import InputError
+from tussock.render import Eye, open_renderer
+from tussock.render.images.writing import Grid, published_part, write_database
+from tussock.world import InputError
 
 SHAPES = [(720, 150, 1), (90, 25, 4), (90, 25, 1), (120, 25, 4)]
 

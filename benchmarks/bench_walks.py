@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import worlds
 
-from navigation import Agent, Encoding, PerfectMemory, Recording, learn, make_model, training_poses
-from navigation.training import training_views
-from render import Eye, open_renderer
-from world.walk import generate_route
+from tussock.navigation import Agent, Encoding, PerfectMemory, Recording, learn, make_model, training_poses
+from tussock.navigation.training import training_views
+from tussock.render import Eye, open_renderer
+from tussock.world.routes import generate_route
 
 SNAPSHOTS, STEPS, AGENTS = 200, 200, 32
 
@@ -78,7 +78,7 @@ def test_training(measure, walker):
 
 @pytest.mark.parametrize("arguments", ["--help", "view --world tiny --out view.png"])
 def test_start_up(measure, tmp_path, arguments):
-    command = [sys.executable, "-m", "navigation.cli", *arguments.split()]
+    command = [sys.executable, "-m", "tussock", *arguments.split()]
     measure(
         f"tussock {arguments}",
         lambda: subprocess.run(command, check=True, capture_output=True, cwd=tmp_path),

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from render import Eye
-from world import World
-from world.geometry import column_azimuths
+from tussock.render import Eye
+from tussock.world import World
+from tussock.world.geometry import column_azimuths
 
 
 def view(

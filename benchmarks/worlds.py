@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from world import Bounds, World
-from world.files import read_world
+from tussock.world import Bounds, World
+from tussock.world.files import read_world
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex" / "world5000_gray.bin"
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from navigation import Encoding, learn, make_model, training_poses
-from navigation.models import MODELS
-from navigation.plots import familiarity_curves
-from render import open_renderer
-from world import World
-from world.geometry import Pose, Route, wrap_angle
-from world.walk import generate_route
+from tussock.navigation import Encoding, learn, make_model, training_poses
+from tussock.navigation.models import MODELS
+from tussock.navigation.reports.plots import familiarity_curves
+from tussock.render import open_renderer
+from tussock.world import World
+from tussock.world.geometry import Pose, Route, wrap_angle
+from tussock.world.routes import generate_route
 
 PICTURES = Path(__file__).parents[1] / "assets" / "models"
 STRETCH = 0.5  # m over which the route's change of heading is taken

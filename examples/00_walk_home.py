@@ -1,9 +1,9 @@
 """Grow a world, learn a route through it, and walk it home from a decimetre beside its start."""
 
-from navigation import Agent, Encoding, PerfectMemory, learn, training_poses
-from render import open_renderer
-from world import World
-from world.walk import generate_route
+from tussock.navigation import Agent, Encoding, PerfectMemory, learn, training_poses
+from tussock.render import open_renderer
+from tussock.world import World
+from tussock.world.routes import generate_route
 
 world = World.generate("tussock-field", seed=7)
 route = generate_route(world, seed=7)

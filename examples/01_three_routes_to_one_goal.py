@@ -1,10 +1,10 @@
 """Infomax learns three routes to one goal, one after the other, and walks home from the start of each: its memory does not grow."""
 
-from navigation import Agent, Encoding, Infomax, training_poses
-from navigation.training import training_views
-from render import open_renderer
-from world import World
-from world.walk import generate_route
+from tussock.navigation import Agent, Encoding, Infomax, training_poses
+from tussock.navigation.training import training_views
+from tussock.render import open_renderer
+from tussock.world import World
+from tussock.world.routes import generate_route
 
 world = World.generate("tussock-field", seed=5)
 routes = [generate_route(world, seed, length=4.0, goal=(4.9, 4.9)) for seed in (1, 2, 3)]

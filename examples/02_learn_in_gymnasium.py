@@ -4,10 +4,10 @@ import gymnasium
 import numpy as np
 import torch
 
-from navigation import PerfectMemory
-from navigation.rotation import best_turn, scan_window
+from tussock.navigation import PerfectMemory
+from tussock.navigation.scan import best_turn, scan_window
 
-env = gymnasium.make("navigation.environment:tussock/RouteFollowing-v0", world_seed=7, encoding="edges")
+env = gymnasium.make("tussock.navigation.rl.environment:tussock/RouteFollowing-v0", world_seed=7, encoding="edges")
 observation, info = env.reset(seed=0)
 views, _ = env.unwrapped.training_views(learning_walk=0.2)
 memory = PerfectMemory().fit(torch.from_numpy(views))

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from navigation.sweeps.report import write_sweep_report
-from navigation.sweeps.spec import read_sweep
-from navigation.sweeps.sweep import run_sweep
+from tussock.navigation.sweeps.report import write_sweep_report
+from tussock.navigation.sweeps.spec import read_sweep
+from tussock.navigation.sweeps.sweep import run_sweep
 
 SWEEP = """
 [fixed]

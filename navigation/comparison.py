@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from render.renderer import Renderer
-from world.geometry import Route
+from tussock.render.renderer import Renderer
+from tussock.world.geometry import Route
 
-from .agent import ARRIVED, Agent
 from .encoding import Encoding
 from .evaluation import errors_on, views_east
-from .familiarity import Model
+from .models.base import Model
 from .training import training_poses, training_views
+from .walk import ARRIVED, Agent
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
 Views = UInt8[np.ndarray, "n height width channels"]
 Images = Float32[np.ndarray, "n h w"]

@@ -7,13 +7,13 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from render.renderer import Renderer
-from world.errors import InputError
-from world.geometry import Bounds, Route, wrap_angle
+from tussock.render.renderer import Renderer
+from tussock.world.errors import InputError
+from tussock.world.geometry import Bounds, Route, wrap_angle
 
 from .encoding import Encoding
-from .familiarity import FamiliarityModel, Images
-from .rotation import best_turn, scan_window
+from .models.base import FamiliarityModel, Images
+from .scan import best_turn, scan_window
 
 BATCH = 64  # views rendered, encoded and scored at once
 RECOVERED_DEG = 45.0  # a heading less than this off counts as recovered

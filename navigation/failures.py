@@ -8,15 +8,15 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from render.near import covered_within
-from render.renderer import Renderer
-from world.geometry import Pose, Route, columns_of_turn, wrap_angle
+from tussock.render.occlusion import covered_within
+from tussock.render.renderer import Renderer
+from tussock.world.geometry import Pose, Route, columns_of_turn, wrap_angle
 
-from .agent import Step
 from .encoding import Encoding
 from .evaluation import RECOVERED_DEG
 from .models.perfect_memory import PerfectMemory
 from .training import AHEAD, training_views
+from .walk import Step
 
 # Of several that apply, the first is the cause.
 OCCLUSION, OFF_CATCHMENT, ALIASING, UNLEARNED, CORNER, UNEXPLAINED = CAUSES = (

@@ -5,7 +5,7 @@ from threading import Lock
 import torch
 from threadpoolctl import threadpool_limits
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
 
 def use_threads(count: int) -> None:

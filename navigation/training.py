@@ -6,12 +6,12 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from render.renderer import Renderer
-from world.errors import InputError
-from world.geometry import Bounds, Route, wrap_angle
+from tussock.render.renderer import Renderer
+from tussock.world.errors import InputError
+from tussock.world.geometry import Bounds, Route, wrap_angle
 
 from .encoding import Encoding
-from .familiarity import FamiliarityModel
+from .models.base import FamiliarityModel
 
 AHEAD = 0.3  # m; how far ahead on the route a view taken beside it faces
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides

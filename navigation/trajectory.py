@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from world.files import replacing
+from tussock.world.atomic import replacing
 
-from .agent import ARRIVED, Step
 from .failures import CAUSES, Evidence, cause, walk_cause
+from .walk import ARRIVED, Step
 
 COLUMNS = (
     "step", "x_m", "y_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",

@@ -1,6 +1,6 @@
 """Panoramas of a world at any pose, by three independent renderers."""
 
-from .eye import Eye
-from .renderer import Renderer, open_renderer
+import lazy_loader
 
-__all__ = ["Eye", "Renderer", "open_renderer"]
+# The names and where they are stand in __init__.pyi; each is loaded when it is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from world.geometry import column_azimuths
+from tussock.world.geometry import column_azimuths
 
 from .eye import Eye
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from world.errors import InputError
-from world.geometry import FARTHEST
+from tussock.world.errors import InputError
+from tussock.world.geometry import FARTHEST
 
 MOST_RAYS = 10**8  # 1.2 GB a thread to draw with
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
 # What must load (any one name of each group), and the Debian packages it is in.
 _NEEDS = {

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from world.colours import face_rgb, texture_factor, texture_of
-from world.errors import InputError
-from world.scene import World
+from tussock.world.errors import InputError
+from tussock.world.mesh_materials import face_rgb, texture_factor, texture_of
+from tussock.world.scene import World
 
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye

@@ -7,9 +7,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from world.errors import InputError
-from world.geometry import FARTHEST, Pose
-from world.scene import World
+from tussock.world.errors import InputError
+from tussock.world.geometry import FARTHEST, Pose
+from tussock.world.scene import World
 
 from .eye import Eye
 

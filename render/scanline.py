@@ -27,13 +27,13 @@ import numba
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from world.errors import InputError
-from world.geometry import column_azimuths
-from world.scene import World
+from tussock.world.errors import InputError
+from tussock.world.geometry import column_azimuths
+from tussock.world.scene import World
 
 from .eye import Eye
 from .renderer import Poses, as_poses
-from .tree import TriangleTree
+from .triangle_tree import TriangleTree
 
 # atan(x) / x as a polynomial in x^2 on [0, 1], within 2e-7: enough to find candidates, which exact tests follow.
 _x = np.cos(np.pi * (np.arange(200) + 0.5) / 400)

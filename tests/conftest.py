@@ -11,8 +11,8 @@ from jaxtyping import install_import_hook
 
 # All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
 CHECKED = [
-    "world", "render.eye", "render.tree", "render.renderer", "render.cubemap", "render.raster", "render.database", "render.database_files",
-    "render.database_writing", "render.database_check", "render.database_flow", "navigation",
+    "tussock.world", "tussock.render.eye", "tussock.render.triangle_tree", "tussock.render.renderer", "tussock.render.cubemap",
+    "tussock.render.raster", "tussock.render.images", "tussock.navigation",
 ]  # fmt: skip
 install_import_hook(CHECKED, "typecheck.check")
 

@@ -12,13 +12,13 @@ from fuzzing import FOLDER, VALUES, answer, damaged, holds, main
 from hypothesis import given
 from hypothesis import strategies as st
 
-from render import Eye, open_renderer
-from render.database import read_database, read_image
-from render.database_check import check_database
-from render.database_files import ENTRIES, METADATA, read_metadata, write_metadata
-from render.database_writing import Grid, write_database
-from world.geometry import Bounds
-from world.scene import World
+from tussock.render import Eye, open_renderer
+from tussock.render.images.check import check_database
+from tussock.render.images.database import read_database, read_image
+from tussock.render.images.files import ENTRIES, METADATA, read_metadata, write_metadata
+from tussock.render.images.writing import Grid, write_database
+from tussock.world.geometry import Bounds
+from tussock.world.scene import World
 
 SHEET = b"""X [mm], Y [mm], Z [mm], Heading [degrees], Filename
 100, 200, 10, 90, image_00000.png

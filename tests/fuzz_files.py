@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from render import Eye, open_renderer
-from world.files import read_route, read_world, write_world
-from world.scene import World
+from tussock.render import Eye, open_renderer
+from tussock.world.files import read_world, write_world
+from tussock.world.route_files import read_route
+from tussock.world.scene import World
 
 
 def whole_worlds() -> dict[str, list[bytes]]:

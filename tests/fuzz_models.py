@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from safetensors.torch import load, save
 from scenes import views
 
-from navigation.encoding import FILTERS, SOURCES, Encoding
-from navigation.model_files import load_model, save_model
-from navigation.models import MODELS, make_model
-from render import Eye
+from tussock.navigation.encoding import FILTERS, SOURCES, Encoding
+from tussock.navigation.models import MODELS, make_model
+from tussock.navigation.models.files import load_model, save_model
+from tussock.render import Eye
 
 NAMES = [*MODELS, "opponent-perfect-memory", "opponent-mlp"]
 CHEAP = {

@@ -11,12 +11,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scenes import random_world
 
-from navigation.cli import main as tussock
-from render import Eye, open_renderer
-from world.geometry import Route
-from world.params import WorldParams
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.cli.main import main as tussock
+from tussock.render import Eye, open_renderer
+from tussock.world.geometry import Route
+from tussock.world.params import WorldParams
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 odd = (
     st.floats()

@@ -7,7 +7,7 @@ from fuzzing import FOLDER, NUMBERS, answer, damaged, holds, main
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from navigation.sweeps.spec import SETTINGS, read_sweep
+from tussock.navigation.sweeps.spec import SETTINGS, read_sweep
 
 GOOD = b"""title = "a sweep"
 [fixed]

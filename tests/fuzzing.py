@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
 T = TypeVar("T")
 PROPERTIES: dict[str, tuple[Callable, int]] = {}

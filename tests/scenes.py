@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
-from world.geometry import Bounds
-from world.scene import Ground, World
+from tussock.world.geometry import Bounds
+from tussock.world.scene import Ground, World
 
 FIELD = Bounds(-3.0, -3.0, 3.0, 3.0)
 

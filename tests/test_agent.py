@@ -8,17 +8,17 @@ import pytest
 import torch
 from scenes import random_poses
 
-from navigation.agent import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Agent
-from navigation.encoding import Encoding
-from navigation.models import Chain, PerfectMemory
-from navigation.training import AHEAD, SIDES, learn, training_poses
-from navigation.trajectory import COLUMNS, Trajectory
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.geometry import Bounds, Pose, Route, wrap_angle
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import Chain, PerfectMemory
+from tussock.navigation.training import AHEAD, SIDES, learn, training_poses
+from tussock.navigation.trajectory import COLUMNS, Trajectory
+from tussock.navigation.walk import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Agent
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.geometry import Bounds, Pose, Route, wrap_angle
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 ENCODING = Encoding.named("edges", resize=3)
 

@@ -7,9 +7,9 @@ import torch
 from scenes import random_poses, random_world, views
 from worlds import blades
 
-from navigation import Infomax, PerfectMemory
-from navigation.models.infomax import infomax_update
-from render import Eye, open_renderer
+from tussock.navigation import Infomax, PerfectMemory
+from tussock.navigation.models.infomax import infomax_update
+from tussock.render import Eye, open_renderer
 
 
 @pytest.mark.parametrize("world", [random_world(seed=8, n=60), blades(300)], ids=["random", "blades"])

@@ -14,13 +14,14 @@ import cv2
 import numpy as np
 import pytest
 
-from navigation.cli import main
-from navigation.model_files import load_model
-from navigation.models import MODELS
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.files import read_route, read_world
-from world.scene import World
+from tussock.navigation.cli.main import main
+from tussock.navigation.models import MODELS
+from tussock.navigation.models.files import load_model
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.files import read_world
+from tussock.world.route_files import read_route
+from tussock.world.scene import World
 
 TUSSOCK = str(Path(sys.executable).with_name("tussock"))
 SMALL = ["--world", "tiny", "--size", "180x40", "--seed", "2"]
@@ -73,7 +74,7 @@ def test_version_is_that_of_the_package(capfd):
 
 def test_help_loads_nothing_heavy():
     script = (
-        "import sys; from navigation.cli import main\n"
+        "import sys; from tussock.navigation.cli.main import main\n"
         "try: main(['run', '--help'])\n"
         "except SystemExit: print(sorted({'torch', 'numba', 'trimesh', 'rerun', 'matplotlib', 'cv2', 'scipy'} & set(sys.modules)))"
     )
@@ -432,7 +433,7 @@ def test_a_renderer_that_is_not_there_is_an_error_and_not_another_one():
         "    return real(name, *a, **k)\n"
         "ctypes.CDLL = missing\n"
         "ctypes.util.find_library = lambda name: None\n"
-        "from navigation.cli import main\n"
+        "from tussock.navigation.cli.main import main\n"
         "main(['view', '--world', 'tiny', '--at', '1,1,0', '--renderer', sys.argv[1]])"
     )
     for backend, package in (("egl", "libegl1"), ("osmesa", "libosmesa6")):

@@ -16,17 +16,17 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from navigation.cli import main
-from navigation.database_commands import DatabaseGridCommand
-from render.database import Database, read_database, read_image
-from render.database_check import check_database
-from render.database_files import ENTRIES, METADATA, as_kept, read_metadata, write_metadata
-from render.database_writing import Grid, write_database
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.geometry import Bounds, wrap_angle
-from world.scene import World
+from tussock.navigation.cli.databases import DatabaseGridCommand
+from tussock.navigation.cli.main import main
+from tussock.render.eye import Eye
+from tussock.render.images.check import check_database
+from tussock.render.images.database import Database, read_database, read_image
+from tussock.render.images.files import ENTRIES, METADATA, as_kept, read_metadata, write_metadata
+from tussock.render.images.writing import Grid, write_database
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.geometry import Bounds, wrap_angle
+from tussock.world.scene import World
 
 WORLD = World.generate("tiny", 1)
 EYE = Eye(width=24, height=6)
@@ -197,7 +197,7 @@ MANY = ["--world", "tiny", "--seed", "1", "--size", "24x6", "--spacing-m", "0.08
 
 def drawing(out: Path) -> subprocess.Popen:
     """tussock database grid, running."""
-    command = [sys.executable, "-m", "navigation.cli", "database", "grid", *MANY, "--out", str(out), "--json"]
+    command = [sys.executable, "-m", "tussock", "database", "grid", *MANY, "--out", str(out), "--json"]
     here = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
     process = subprocess.Popen(command, env=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (out / METADATA).exists():

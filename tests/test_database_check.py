@@ -7,15 +7,16 @@ import cv2
 import numpy as np
 import pytest
 
-from render.database import read_database
-from render.database_check import Problem, check_database
-from render.database_files import ENTRIES, METADATA, read_metadata, write_metadata
-from render.database_writing import Grid, write_database
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.files import read_route, read_world
-from world.scene import World
+from tussock.render.eye import Eye
+from tussock.render.images.check import Problem, check_database
+from tussock.render.images.database import read_database
+from tussock.render.images.files import ENTRIES, METADATA, read_metadata, write_metadata
+from tussock.render.images.writing import Grid, write_database
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.files import read_world
+from tussock.world.route_files import read_route
+from tussock.world.scene import World
 
 EYE = Eye(width=24, height=6)
 SIDE = 8

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import random_poses, random_world
 
-from navigation.encoding import PRESETS, Encoding
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
+from tussock.navigation.encoding import PRESETS, Encoding
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
 
 CHAINS = [
     "grey",

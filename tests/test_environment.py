@@ -15,20 +15,21 @@ from hypothesis import example, given
 from hypothesis import strategies as some
 from scenes import random_world
 
-from navigation.agent import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Agent
-from navigation.encoding import Encoding
-from navigation.environment import ID, ROUNDING, RouteFollowing, RouteFollowingVector
-from navigation.models import PerfectMemory
-from navigation.rotation import best_turn, scan_window
-from navigation.task import ARRIVAL
-from navigation.training import learn, training_poses
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.files import write_route, write_world
-from world.geometry import Route
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import PerfectMemory
+from tussock.navigation.rl.environment import ID, ROUNDING, RouteFollowing, RouteFollowingVector
+from tussock.navigation.rl.task import ARRIVAL
+from tussock.navigation.scan import best_turn, scan_window
+from tussock.navigation.training import learn, training_poses
+from tussock.navigation.walk import ARRIVED, LOST, OUT_OF_STEPS, OUT_OF_WORLD, STUCK, Agent
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.files import write_world
+from tussock.world.geometry import Route
+from tussock.world.route_files import write_route
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 SMALL = Eye(width=24, height=6)
 WORLD = World.generate("tiny", 2)
@@ -59,7 +60,7 @@ def test_gymnasium_finds_nothing_wrong(encoding):
 
 @pytest.mark.parametrize("encoding", [None, "edges"])
 def test_the_name_leads_here(encoding):
-    env = gymnasium.make(f"navigation.environment:{ID}", world="tiny", eye=SMALL, encoding=encoding)
+    env = gymnasium.make(f"tussock.navigation.rl.environment:{ID}", world="tiny", eye=SMALL, encoding=encoding)
     assert isinstance(env.unwrapped, RouteFollowing)
     env.close()
     many = gymnasium.make_vec(ID, num_envs=3, world="tiny", eye=SMALL, encoding=encoding)
@@ -71,7 +72,7 @@ def test_the_name_leads_here(encoding):
 
 
 def test_only_the_environment_needs_gymnasium():
-    code = "import sys; sys.modules['gymnasium'] = None; from navigation import Agent; print('here'); import navigation.environment"
+    code = "import sys; sys.modules['gymnasium'] = None; from tussock import Agent; print('here'); import tussock.navigation.rl.environment"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout == "here\n"
     assert done.stderr.splitlines()[-1].startswith("ImportError: the environment needs Gymnasium; install it with")
@@ -330,7 +331,7 @@ def test_settings_of_the_wrong_type_are_refused():
     cases = "\n".join(
         f"try: RouteFollowing({case}).reset()\nexcept InputError as error: print(error)" for case in ILL_TYPED
     )
-    code = f"from navigation.environment import RouteFollowing\nfrom world.errors import InputError\n{cases}"
+    code = f"from tussock.navigation.rl.environment import RouteFollowing\nfrom tussock.world.errors import InputError\n{cases}"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.splitlines() == list(ILL_TYPED.values()), done.stderr
 

@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from navigation.encoding import Encoding
-from navigation.evaluation import grid_positions, heading_errors, nearest_view
-from navigation.models import PerfectMemory, make_model
-from navigation.training import learn, training_poses
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.files import read_route, read_world
-from world.geometry import Bounds, Route, wrap_angle
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.evaluation import grid_positions, heading_errors, nearest_view
+from tussock.navigation.models import PerfectMemory, make_model
+from tussock.navigation.training import learn, training_poses
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.files import read_world
+from tussock.world.geometry import Bounds, Route, wrap_angle
+from tussock.world.route_files import read_route
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 FIELD = Bounds(0, 0, 10, 10)
 ROUTE = Route.through(np.array([[1.0, 1.0], [2.0, 1.3], [2.5, 2.2]])).resampled(0.05)

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import random_poses, random_world, world_of
 
-from navigation import failures
-from navigation.agent import ARRIVED, LOST, Agent
-from navigation.encoding import Encoding
-from navigation.failures import (
+from tussock.navigation import failures
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.failures import (
     ALIASING,
     CATCHMENT,
     CAUSES,
@@ -35,14 +34,15 @@ from navigation.failures import (
     in_words,
     walk_cause,
 )
-from navigation.models import make_model
-from navigation.recording import Recording
-from navigation.training import learn
-from navigation.trajectory import COLUMNS, Trajectory
-from render.eye import Eye
-from render.near import covered_within
-from render.renderer import open_renderer
-from world.geometry import Pose, Route
+from tussock.navigation.models import make_model
+from tussock.navigation.recording.log import Recording
+from tussock.navigation.training import learn
+from tussock.navigation.trajectory import COLUMNS, Trajectory
+from tussock.navigation.walk import ARRIVED, LOST, Agent
+from tussock.render.eye import Eye
+from tussock.render.occlusion import covered_within
+from tussock.render.renderer import open_renderer
+from tussock.world.geometry import Pose, Route
 
 EYE = Eye(width=72, height=15, samples=2)
 GREY = Encoding.parse("grey")

@@ -9,10 +9,12 @@ from jaxtyping import TypeCheckError
 from PIL import Image
 from scenes import random_world
 
-from world.errors import InputError
-from world.files import read_route, read_world, replacing, write_route, write_world
-from world.geometry import Route
-from world.scene import World
+from tussock.world.atomic import replacing
+from tussock.world.errors import InputError
+from tussock.world.files import read_world, write_world
+from tussock.world.geometry import Route
+from tussock.world.route_files import read_route, write_route
+from tussock.world.scene import World
 
 SUFFIXES = (".glb", ".ply")
 

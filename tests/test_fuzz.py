@@ -11,15 +11,15 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from navigation.model_files import load_model
-from navigation.models import make_model
-from render import Eye, open_renderer
-from render.database import read_database, read_image
-from render.database_files import ENTRIES, METADATA, read_entries
-from world.errors import InputError
-from world.files import read_world
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.models import make_model
+from tussock.navigation.models.files import load_model
+from tussock.render import Eye, open_renderer
+from tussock.render.images.database import read_database, read_image
+from tussock.render.images.files import ENTRIES, METADATA, read_entries
+from tussock.world.errors import InputError
+from tussock.world.files import read_world
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 HERE = Path(__file__).parent
 GENEROUS = 600  # seconds; only what hangs takes so long
@@ -72,7 +72,7 @@ def test_a_mesh_that_stands_in_very_many_places_is_refused(tmp_path, monkeypatch
     for i in range(9):
         scene.add_geometry(trimesh.creation.box(), geom_name="box", node_name=f"place{i}")
     scene.export(tmp_path / "w.glb")
-    monkeypatch.setattr("world.files.MOST_TRIANGLES", 100)
+    monkeypatch.setattr("tussock.world.files.MOST_TRIANGLES", 100)
     with pytest.raises(InputError, match="holds 108 triangles; a world has up to 100"):
         read_world(tmp_path / "w.glb")
 

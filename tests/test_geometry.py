@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from world.errors import InputError
-from world.geometry import Bounds, Pose, Route, column_azimuths, columns_of_turn, turn_of_columns, wrap_angle
+from tussock.world.errors import InputError
+from tussock.world.geometry import Bounds, Pose, Route, column_azimuths, columns_of_turn, turn_of_columns, wrap_angle
 
 number = st.floats(-50, 50)
 angle = st.floats(-10, 10)

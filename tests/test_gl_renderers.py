@@ -18,13 +18,13 @@ import pytest
 import trimesh
 from PIL import Image
 
-from render import Eye, Renderer, gl, open_renderer
-from render.cubemap import Cubemap, face_size_for
-from render.raster import RasterRenderer
-from world.errors import InputError
-from world.files import read_world
-from world.geometry import Bounds, Pose, turn_of_columns
-from world.scene import Ground, World
+from tussock.render import Eye, Renderer, gl, open_renderer
+from tussock.render.cubemap import Cubemap, face_size_for
+from tussock.render.raster import RasterRenderer
+from tussock.world.errors import InputError
+from tussock.world.files import read_world
+from tussock.world.geometry import Bounds, Pose, turn_of_columns
+from tussock.world.scene import Ground, World
 
 BACKENDS = ("egl", "osmesa")
 SKY, SAND = (191, 191, 191), (229, 183, 90)

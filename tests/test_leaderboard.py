@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 import torch
 
-from navigation.benchmark.definition import BENCHMARK, BENCHMARKS, QUICK, SETTINGS, Benchmark
-from navigation.benchmark.leaderboard import leaderboard, read_results
-from navigation.benchmark.learners import enter_learner, tasks
-from navigation.benchmark.models import enter, enter_named
-from navigation.benchmark.results import Result, interval_over_worlds, read_result, score
-from navigation.benchmark_commands import BenchmarkCommand
-from navigation.cli import main
-from navigation.learning_options import RunOptions
-from navigation.models import PerfectMemory, make_model
-from navigation.rotation import best_turn, scan_window
-from navigation.sweeps.report import write_sweep_report
-from navigation.sweeps.work import teach, walk
-from world.errors import InputError
+from tussock.navigation.benchmark.definition import BENCHMARK, BENCHMARKS, QUICK, SETTINGS, Benchmark
+from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
+from tussock.navigation.benchmark.learners import enter_learner, tasks
+from tussock.navigation.benchmark.models import enter, enter_named
+from tussock.navigation.benchmark.results import Result, interval_over_worlds, read_result, score
+from tussock.navigation.cli.benchmark import BenchmarkCommand
+from tussock.navigation.cli.main import main
+from tussock.navigation.cli.run_options import RunOptions
+from tussock.navigation.models import PerfectMemory, make_model
+from tussock.navigation.scan import best_turn, scan_window
+from tussock.navigation.sweeps.report import write_sweep_report
+from tussock.navigation.sweeps.work import teach, walk
+from tussock.world.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 MEASURED, PAGE = ROOT / "docs" / "benchmark", ROOT / "docs" / "benchmark.md"
@@ -255,8 +255,8 @@ def test_what_does_not_compare_is_refused_before_the_first_run(tmp_path, monkeyp
     def run_none(*given, **settings):
         raise AssertionError("a run has begun")
 
-    monkeypatch.setattr("navigation.benchmark.models.run_sweep", run_none)
-    monkeypatch.setattr("navigation.benchmark.models.teach", run_none)
+    monkeypatch.setattr("tussock.navigation.benchmark.models.run_sweep", run_none)
+    monkeypatch.setattr("tussock.navigation.benchmark.models.teach", run_none)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "it.json").write_text(made_up("it", line()).to_json())
     refusal = r"it\.json holds a result of made-up-1 .+ this would be one of tussock-1.+; give another --out"
@@ -433,7 +433,7 @@ def test_what_was_measured_comes_out_again():
 
 def test_what_the_page_tells_people_to_type_works(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("navigation.benchmark.QUICK", TINY)
+    monkeypatch.setattr("tussock.navigation.benchmark.QUICK", TINY)
     examples = re.findall(r"```python\n(.+?)```", PAGE.read_text(), flags=re.DOTALL)
     names = set()
     for example in examples:

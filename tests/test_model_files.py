@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from safetensors.torch import save_file
 from scenes import views
 
-from navigation.encoding import Encoding
-from navigation.familiarity import Model
-from navigation.model_files import load_model, save_model
-from navigation.models import MODELS, make_model
-from render.eye import Eye
-from world.errors import InputError
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import MODELS, make_model
+from tussock.navigation.models.base import Model
+from tussock.navigation.models.files import load_model, save_model
+from tussock.render.eye import Eye
+from tussock.world.errors import InputError
 
 CHEAPER = {
     "mlp": {"max_iter": 5},

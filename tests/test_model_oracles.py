@@ -16,9 +16,7 @@ from sklearn.metrics import classification_report
 from sklearn.model_selection import GridSearchCV
 from sklearn.neural_network import MLPClassifier
 
-from navigation import rotation
-from navigation.familiarity import SequenceModel, SnapshotModel
-from navigation.models import (
+from tussock.navigation.models import (
     MLP,
     MODELS,
     RBM,
@@ -32,15 +30,18 @@ from navigation.models import (
     PerfectMemory,
     RandomHeadings,
     VisualCompass,
+    filter_bank,
     make_model,
     perfect_memory,
 )
-from navigation.models.adaboost import best_stump, haar_filters
-from navigation.models.infomax import RATES, infomax_update
-from navigation.models.mlp_rotation import swayed
-from navigation.models.mushroom_body import receptive_fields
-from navigation.models.random import mixed
-from world.errors import InputError
+from tussock.navigation.models.adaboost import best_stump, haar_filters
+from tussock.navigation.models.base import SequenceModel, SnapshotModel
+from tussock.navigation.models.infomax import RATES, infomax_update
+from tussock.navigation.models.mlp_rotation import swayed
+from tussock.navigation.models.mushroom_body import receptive_fields
+from tussock.navigation.models.random import mixed
+from tussock.navigation.scan import scan_window
+from tussock.world.errors import InputError
 
 REFUSED = (InputError, TypeCheckError)
 CHEAPER = {
@@ -106,7 +107,7 @@ def test_another_device_finds_the_same_nearest(width):
 def test_many_snapshots_are_matched_in_blocks(monkeypatch):
     learned = views(30)
     scan, match = PerfectMemory().fit(learned).match(learned)
-    monkeypatch.setattr(rotation, "BLOCK", 4)
+    monkeypatch.setattr(filter_bank, "BLOCK", 4)
     scan_of_blocks, match_of_blocks = PerfectMemory().fit(learned).match(learned)
     assert torch.allclose(scan_of_blocks, scan, atol=1e-4)
     assert torch.equal(match_of_blocks, match)
@@ -227,7 +228,7 @@ def test_a_chain_follows_only_rotations_it_is_allowed():
     walk = Chain().fit(snapshots).follow()
     walk.look(snapshots[20].roll(-9, dims=-1), ALL_ROUND)
     assert walk.active == 20  # which is rotation 9
-    narrow = rotation.scan_window(36, np.pi / 3)
+    narrow = scan_window(36, np.pi / 3)
     walk = Chain().fit(snapshots).follow()
     walk.look(snapshots[20].roll(-9, dims=-1), narrow)
     assert walk.active != 20

@@ -9,10 +9,10 @@ import torch
 from jaxtyping import TypeCheckError
 from scenes import views
 
-from navigation.familiarity import FamiliarityModel, IncrementalModel, Model
-from navigation.model_files import load_model, save_model
-from navigation.models import MODELS, OPPONENT, make_model
-from world.errors import InputError
+from tussock.navigation.models import MODELS, OPPONENT, make_model
+from tussock.navigation.models.base import FamiliarityModel, IncrementalModel, Model
+from tussock.navigation.models.files import load_model, save_model
+from tussock.world.errors import InputError
 
 REFUSED = (InputError, TypeCheckError)  # with type checking on, as here, a wrong rank does not reach our own check
 
@@ -398,7 +398,7 @@ def test_unknown_models_are_refused_with_the_known_ones(name):
 
 
 def test_opponent_is_the_function_however_often_it_is_asked_for():
-    import navigation
+    from tussock import navigation
 
     make_model("opponent-perfect-memory")
     assert callable(navigation.opponent)

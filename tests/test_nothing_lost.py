@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-from navigation.recording import viewer_program
+from tussock.navigation.recording.log import viewer_program
 
 TUSSOCK = str(Path(sys.executable).with_name("tussock"))
 WORLD = ["--world", "tiny", "--seed", "2", "--size", "120x25"]

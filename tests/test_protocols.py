@@ -12,14 +12,14 @@ import pandas as pd
 import pytest
 from browser import WIDTHS, in_browser
 
-from navigation.cli import main
-from navigation.encoding import Encoding
-from navigation.learning_options import RunOptions
-from navigation.models import make_model
-from navigation.protocols import ARDIN2016, AZEVEDO2025, BADDELEY2012, KAGIOULIS2024, PROTOCOLS, places
-from navigation.protocols.azevedo2025 import of_walk
-from navigation.protocols.protocol import place_names
-from world.errors import InputError
+from tussock.navigation.cli.main import main
+from tussock.navigation.cli.run_options import RunOptions
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import make_model
+from tussock.navigation.studies.protocols import ARDIN2016, AZEVEDO2025, BADDELEY2012, KAGIOULIS2024, PROTOCOLS, places
+from tussock.navigation.studies.protocols.azevedo2025 import of_walk
+from tussock.navigation.studies.protocols.protocol import place_names
+from tussock.world.errors import InputError
 
 TINY = ("--quick", "--world", "tiny", "--worlds", "2")
 
@@ -193,9 +193,9 @@ def test_azevedos_displacement_of_a_walk_by_hand():
 
 def test_a_route_has_the_length_that_it_has(tmp_path):
     """What does not fit is shorter than asked for, in a world from a file as well."""
-    from navigation.sweeps.work import open_path, teach, walk
-    from world.files import write_world
-    from world.scene import World
+    from tussock.navigation.sweeps.work import open_path, teach, walk
+    from tussock.world.files import write_world
+    from tussock.world.scene import World
 
     write_world(World.generate("tiny", seed=1), tmp_path / "world.glb")
     for world in ("tiny", str(tmp_path / "world.glb")):
@@ -232,7 +232,7 @@ def replication(tmp_path_factory) -> Path:
     command = [
         sys.executable,
         "-m",
-        "navigation.cli",
+        "tussock",
         "replicate",
         "kagioulis2024",
         *TINY,
@@ -338,7 +338,7 @@ def test_bad_input_is_one_line(words, message, tmp_path, capsys, monkeypatch):
 
 
 def test_a_model_that_never_walked_is_no_verdict():
-    from navigation.protocols.protocol import check_walked
+    from tussock.navigation.studies.protocols.protocol import check_walked
 
     with pytest.raises(InputError, match="no walk with random could be made"):
         check_walked(walks(model=["chain"]), ["chain", "random"])

@@ -12,17 +12,17 @@ import cv2
 import numpy as np
 import pytest
 
-from navigation.agent import Agent
-from navigation.encoding import Encoding
-from navigation.models import PerfectMemory
-from navigation.recording import Recording, viewer_program
-from navigation.runs import play
-from navigation.training import learn, training_poses
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import PerfectMemory
+from tussock.navigation.recording.log import Recording, viewer_program
+from tussock.navigation.recording.run_folder import play
+from tussock.navigation.training import learn, training_poses
+from tussock.navigation.walk import Agent
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 RERUN = viewer_program()
 ENTITIES = (
@@ -87,13 +87,13 @@ def test_a_killed_walk_leaves_a_recording_up_to_there(tmp_path):
 import os, signal, sys
 from pathlib import Path
 sys.path.insert(0, {str(Path(__file__).parent)!r})
-from navigation.agent import Agent
-from navigation.encoding import Encoding
-from navigation.models import PerfectMemory
-from navigation import recording as recordings
+from tussock.navigation.walk import Agent
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import PerfectMemory
+from tussock.navigation.recording import log as recordings
 from render import Eye, open_renderer
-from world import World
-from world.walk import generate_route
+from tussock.world import World
+from tussock.world.routes import generate_route
 renderer = open_renderer(World.generate("tiny", 2), Eye(width=180, height=40), "cpu")
 route = generate_route(renderer.world, 2).resampled(0.05)
 encoding = Encoding.named("edges")

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from browser import WIDTHS, in_browser
 
-from navigation.cli import main
-from navigation.studies.figures import PICTURES
-from navigation.studies.tables import LISTINGS
-from navigation.studies.thesis import STUDIES
+from tussock.navigation.cli.main import main
+from tussock.navigation.studies.thesis.figures import PICTURES
+from tussock.navigation.studies.thesis.tables import LISTINGS
+from tussock.navigation.studies.thesis.thesis import STUDIES
 
 TINY = ("--quick", "--world", "tiny", "--size", "72x15", "--spacing-m", "0.04")
 CLAIMS = {
@@ -27,7 +27,7 @@ CLAIMS = {
 
 
 def tussock(*words) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "navigation.cli", *map(str, words)]
+    command = [sys.executable, "-m", "tussock", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True)
 
 
@@ -35,7 +35,7 @@ def tussock(*words) -> subprocess.CompletedProcess:
 def replication(tmp_path_factory) -> Path:
     """A whole replication, interrupted once."""
     out = tmp_path_factory.mktemp("thesis") / "report"
-    command = [sys.executable, "-m", "navigation.cli", "replicate", "thesis", *TINY, "--out", str(out), "--json"]
+    command = [sys.executable, "-m", "tussock", "replicate", "thesis", *TINY, "--out", str(out), "--json"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:

@@ -6,9 +6,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from navigation import rotation
-from navigation.rotation import FilterBank, best_turn, scan_window
-from world.errors import InputError
+from tussock.navigation.models import filter_bank
+from tussock.navigation.models.filter_bank import FilterBank
+from tussock.navigation.scan import best_turn, scan_window
+from tussock.world.errors import InputError
+from tussock.world.geometry import turn_of_columns, wrap_angle
 
 sizes = st.tuples(st.integers(1, 4), st.integers(1, 5), st.integers(1, 6), st.integers(4, 15))
 
@@ -28,7 +30,7 @@ def test_responses_equal_rolling_and_summing(size, seed):
 def test_blocks_change_nothing(monkeypatch):
     views, filters = torch.randn(3, 4, 12), torch.randn(50, 4, 12)
     whole = FilterBank(filters).responses(views)
-    monkeypatch.setattr(rotation, "BLOCK", 16)
+    monkeypatch.setattr(filter_bank, "BLOCK", 16)
     bank = FilterBank(filters)
     assert len(list(bank.chunks(views))) == 4
     assert torch.allclose(bank.responses(views), whole, atol=1e-5)
@@ -58,9 +60,9 @@ def test_the_best_turn_is_left_for_low_rotations_and_right_for_high_ones():
 
 
 def test_interpolation_finds_the_top_of_a_parabola_between_columns():
-    turns = rotation.turn_of_columns(np.arange(36), 36)
+    turns = turn_of_columns(np.arange(36), 36)
     for top in np.radians([3.0, -41.5, 174.0]):
-        away = rotation.wrap_angle(turns - top)
+        away = wrap_angle(turns - top)
         assert np.isclose(best_turn(-(away**2)[None])[0], top, atol=1e-9)
         assert abs(best_turn(-(away**2)[None], interpolate=False)[0] - top) <= np.radians(5.01)
 
@@ -72,7 +74,7 @@ def test_a_flat_scan_goes_straight_on():
 @given(st.integers(4, 200), st.floats(0.01, 2 * np.pi), st.floats(-np.pi, np.pi))
 def test_a_window_holds_the_rotations_within_half_its_angle(width, angle, centre):
     window = scan_window(width, angle, centre)
-    away = np.abs(rotation.wrap_angle(rotation.turn_of_columns(np.arange(width), width) - centre))
+    away = np.abs(wrap_angle(turn_of_columns(np.arange(width), width) - centre))
     assert window.any()
     assert window[away < angle / 2 - 1e-6].all()
     assert (away[window] <= max(angle / 2, np.pi / width) + 1e-6).all()

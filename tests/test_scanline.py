@@ -9,14 +9,14 @@ import pytest
 import trimesh
 from scenes import random_poses, random_world, world_of
 
-from render.eye import Eye
-from render.renderer import open_renderer
-from render.scanline import ScanlineRenderer
-from render.tree import TriangleTree
-from world.errors import InputError
-from world.files import read_world
-from world.geometry import column_azimuths
-from world.scene import World
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.render.scanline import ScanlineRenderer
+from tussock.render.triangle_tree import TriangleTree
+from tussock.world.errors import InputError
+from tussock.world.files import read_world
+from tussock.world.geometry import column_azimuths
+from tussock.world.scene import World
 
 
 def embree(world: World, eye: Eye, pose) -> np.ndarray:

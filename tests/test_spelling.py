@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import views
 
-from navigation.familiarity import Model
-from navigation.models import MODELS, OPPONENT, make_model, model_class
-from world.errors import InputError
-from world.spelling import split_list
+from tussock.navigation.models import MODELS, OPPONENT, make_model, model_class
+from tussock.navigation.models.base import Model
+from tussock.world.errors import InputError
+from tussock.world.specs import split_list
 
 TUSSOCK = Path(sys.executable).with_name("tussock")
 
@@ -99,16 +99,16 @@ def test_a_spelled_model_learns_as_the_same_made_with_keywords():
 
 
 REFUSED = {
-    "mushroom-body colour=red": "mushroom-body has no parameter 'colour'; there are columns, rows, cells, inputs",
-    "perfect-memory window=1": "perfect-memory has no parameter 'window'; there are none",
+    "mushroom-body colour=red": "mushroom-body has no parameter 'colour'; its parameters are columns, rows, cells, inputs",
+    "perfect-memory window=1": "perfect-memory has no parameter 'window'; its parameters are none",
     "opponent-infomax name=x": "infomax has no parameter 'name'",
     "oracle cells=3": "unknown model 'oracle'; known: ",
-    "infomax seed=3": "the seed is not spelled here; give it as --seed",
-    "rbm device=cuda": "the device is not spelled here; give it as --device",
-    "infomax 3": "'3' is no parameter; give name=value",
-    "infomax rate = 3": "'rate' is no parameter; give name=value",
-    "infomax rate=": "'rate=' is no parameter",
-    "infomax =3": "'=3' is no parameter",
+    "infomax seed=3": "give it as --seed",
+    "rbm device=cuda": "give it as --device",
+    "infomax 3": "'3' is not a parameter; give name=value",
+    "infomax rate = 3": "'rate' is not a parameter; give name=value",
+    "infomax rate=": "'rate=' is not a parameter",
+    "infomax =3": "'=3' is not a parameter",
     "infomax units=3 units=4": "units is given twice",
     "infomax rate=fast": "rate 'fast'; give one of z-scored, unit-range, baddeley or a number from 0",
     "infomax rate=nan": "rate nan",
@@ -132,8 +132,8 @@ def test_what_spells_no_model_is_refused_in_one_line_that_repeats_it():
     # Outside: with the type checks that are on here, some do not come so far.
     script = (
         "import json, sys\n"
-        "from navigation import make_model\n"
-        "from world.errors import InputError\n"
+        "from tussock import make_model\n"
+        "from tussock.world.errors import InputError\n"
         "for text in json.load(sys.stdin):\n"
         "    try:\n"
         "        print('made', make_model(text))\n"

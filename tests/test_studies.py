@@ -11,27 +11,27 @@ from hypothesis.extra import numpy as hnp
 from matplotlib.cbook import boxplot_stats
 from sklearn.model_selection import ParameterGrid
 
-from navigation.encoding import Encoding
-from navigation.models import make_model
-from navigation.pages import cell
-from navigation.studies import published
-from navigation.studies.classifier import FIRST, held_out_views
-from navigation.studies.confidence import _chance
-from navigation.studies.corners import corner_section, corner_views, equally_different, turning
-from navigation.studies.findings import Claim, Findings, plain, read_findings, write_findings
-from navigation.studies.grid_search import share_of
-from navigation.studies.headings import box_of, errors_of, headings
-from navigation.studies.material import Material, material_of_databases, material_of_world
-from navigation.studies.settings import Settings
-from navigation.studies.thesis import STUDIES, run_studies
-from navigation.studies.visual_compass import _minima
-from render.database_writing import Grid, published_part, write_database
-from render.eye import Eye
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.geometry import Route, wrap_angle
-from world.scene import World
-from world.walk import generate_route
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.models import make_model
+from tussock.navigation.reports.findings import Claim, Findings, plain, read_findings, write_findings
+from tussock.navigation.reports.page import cell
+from tussock.navigation.studies.thesis import published
+from tussock.navigation.studies.thesis.classifier import FIRST, held_out_views
+from tussock.navigation.studies.thesis.confidence import _chance
+from tussock.navigation.studies.thesis.corners import corner_section, corner_views, equally_different, turning
+from tussock.navigation.studies.thesis.grid_search import share_of
+from tussock.navigation.studies.thesis.headings import box_of, errors_of, headings
+from tussock.navigation.studies.thesis.material import Material, material_of_databases, material_of_world
+from tussock.navigation.studies.thesis.settings import Settings
+from tussock.navigation.studies.thesis.thesis import STUDIES, run_studies
+from tussock.navigation.studies.thesis.visual_compass import _minima
+from tussock.render.eye import Eye
+from tussock.render.images.writing import Grid, published_part, write_database
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
+from tussock.world.geometry import Route, wrap_angle
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
 
 EYE = Eye(width=72, height=15, samples=1)
 WORLD = World.generate("tiny", 1)

@@ -21,14 +21,14 @@ import psutil
 import pytest
 from browser import WIDTHS, in_browser
 
-from navigation.learning_options import RunOptions
-from navigation.sweeps.figures import along_axis
-from navigation.sweeps.spec import read_sweep
-from navigation.sweeps.statistics import axes_of, by_axis, mean_interval, pairings, worlds_of
-from navigation.sweeps.store import TIMES, Finished, Store, table_of
-from navigation.sweeps.sweep import finished_run, record_again
-from navigation.sweeps.work import Walked, lesson_key, options_of, path_key, run_key
-from world.errors import InputError
+from tussock.navigation.cli.run_options import RunOptions
+from tussock.navigation.sweeps.figures import along_axis
+from tussock.navigation.sweeps.spec import read_sweep
+from tussock.navigation.sweeps.statistics import axes_of, by_axis, mean_interval, pairings, worlds_of
+from tussock.navigation.sweeps.store import TIMES, Finished, Store, table_of
+from tussock.navigation.sweeps.sweep import finished_run, record_again
+from tussock.navigation.sweeps.work import Walked, lesson_key, options_of, path_key, run_key
+from tussock.world.errors import InputError
 
 BIN = Path(sys.executable).parent
 TUSSOCK = str(BIN / "tussock")

@@ -13,12 +13,12 @@ import pytest
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
-from world.errors import InputError
-from world.generate import generate_world, plant_positions
-from world.geometry import Bounds, wrap_angle
-from world.params import PRESETS, WorldParams
-from world.scene import Ground, World
-from world.walk import clearance, generate_route
+from tussock.world.errors import InputError
+from tussock.world.generate import generate_world, plant_positions
+from tussock.world.geometry import Bounds, wrap_angle
+from tussock.world.params import PRESETS, WorldParams
+from tussock.world.routes import clearance, generate_route
+from tussock.world.scene import Ground, World
 
 KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree"}
 
@@ -54,7 +54,7 @@ def test_other_seeds_give_other_worlds():
 
 def test_another_process_grows_the_same_world_and_route():
     code = (
-        "from world.generate import *; from world.params import *; from world.walk import *; import hashlib\n"
+        "from tussock.world.generate import *; from tussock.world.params import *; from tussock.world.routes import *; import hashlib\n"
         "w = generate_world(PRESETS['tiny'], 5)\n"
         "data = w.triangles.tobytes() + w.rgb.tobytes() + generate_route(w, 2).poses.tobytes()\n"
         "print(hashlib.sha256(data).hexdigest())"
@@ -168,7 +168,7 @@ def test_bad_parameters_are_named(name, value):
 def test_values_of_a_wrong_type_are_named_too():
     """In a process of its own: here the type checker would speak first."""
     code = (
-        "from world.params import WorldParams\n"
+        "from tussock.world.params import WorldParams\n"
         "for name, value in {'bush_height': 'tall', 'trees': 2.5, 'ground_rgb': [1, 2], 'haze': None}.items():\n"
         "    try: WorldParams.from_dict({name: value})\n"
         "    except ValueError as error: assert str(error).startswith(f'{name} is '), error\n"
@@ -255,9 +255,9 @@ def test_a_world_is_spelled_with_its_parameters():
     ("text", "message"),
     [
         ("", "unknown preset ''; known: tussock-field"),
-        ("tiny width=3", "world 'tiny width=3': tiny has no parameter 'width'; there are field_width"),
+        ("tiny width=3", "world 'tiny width=3': tiny has no parameter 'width'; its parameters are field_width"),
         ("tiny field_width=900", "field_width is 900"),
-        ("tiny seed=3", "the seed is not spelled here; give it as --seed"),
+        ("tiny seed=3", "give it as --seed"),
     ],
 )
 def test_a_world_that_is_misspelled_is_refused(text, message):

@@ -4,22 +4,19 @@ A world saved as GLB or PLY carries its ground, sky, field, seed and parameters 
 PLY: a header comment), and reads back equal. Coordinates are metres with z up, in every format, as they stand in the file.
 """
 
-import csv
-import errno
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
-from .colours import face_rgb, texture_of
+from .atomic import replacing
 from .errors import InputError
-from .geometry import FARTHEST, Bounds, Route
+from .geometry import FARTHEST, Bounds
+from .mesh_materials import face_rgb, texture_of
 from .params import PRESETS, is_generated
+from .route_files import existing, naming, read_planes, reason
 from .scene import Ground, World
 
 KEY = "tussock"  # under which a file carries what a mesh cannot hold
@@ -30,33 +27,6 @@ ARCHIVES = ("zip", "bz2", "gz")  # trimesh would unpack them, however large what
 # How the original program draws its worlds: green vegetation on sand (sussex/README.md has the frames it drew).
 ANTWORLD_TINT = (0.0, 1.0, 0.0)
 ANTWORLD_GROUND = (229, 183, 90)
-ROUTE_HEADER = ["x_m", "y_m", "heading_deg"]
-
-
-@contextmanager
-def replacing(path: str | os.PathLike) -> Iterator[Path]:
-    """A temporary path beside `path` to write to; it takes `path`'s place when the block ends well, and goes when it does not."""
-    path = Path(path)
-    check_writable(path)
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
-    try:
-        yield partial
-        os.replace(partial, path)
-    except OSError as error:
-        remedy = "make room there" if error.errno == errno.ENOSPC else "give another name"
-        raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy}") from error
-    finally:
-        partial.unlink(missing_ok=True)
-
-
-def check_writable(path: Path) -> None:
-    """Refuse a path that no file can be written to: a folder, or in a folder that is not there. Raises InputError."""
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give the name of a file to write")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {path.parent}; create it first")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path} cannot be written: the folder {path.parent} is read-only; choose another")
 
 
 def open_world(name: str, seed: int = 0) -> World:
@@ -73,12 +43,12 @@ def read_world(path: str | os.PathLike) -> World:
 
     Raises InputError where the file is missing, damaged, or holds no triangles, or over MOST_TRIANGLES.
     """
-    path = _existing(path, "world")
+    path = existing(path, "world")
     try:
         with np.errstate(all="ignore"):  # whatever the file holds: a world refuses what is not finite
             return _read_antworld(path) if path.suffix.lower() == ".bin" else _read_mesh(path)
     except InputError as error:
-        raise _naming(path, error) from error
+        raise naming(path, error) from error
 
 
 def _read_mesh(path: Path) -> World:
@@ -99,7 +69,7 @@ def _read_mesh(path: Path) -> World:
     except InputError:
         raise
     except Exception as error:  # trimesh's readers, and those of its textures, raise whatever their parsers do
-        raise InputError(f"{path} cannot be read as a mesh ({_reason(error)}); is it complete?") from error
+        raise InputError(f"{path} cannot be read as a mesh ({reason(error)}); is it complete?") from error
     if len(triangles) == 0:
         raise InputError(f"{path} holds no triangles; a world needs some")
     if kept is None:
@@ -110,7 +80,7 @@ def _read_mesh(path: Path) -> World:
         return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(kept))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
-            f"{path}: its {KEY} metadata cannot be used ({_reason(error)}); write the world again"
+            f"{path}: its {KEY} metadata cannot be used ({reason(error)}); write the world again"
         ) from error
 
 
@@ -162,67 +132,9 @@ def _as_mesh(world: World) -> Any:
     return trimesh.Trimesh(corners, faces, vertex_colors=np.repeat(rgba, 3, axis=0), process=False)
 
 
-def read_route(path: str | os.PathLike) -> Route:
-    """Read a route: CSV with columns x_m, y_m and (optional) heading_deg, or AntWorld `.bin`.
-
-    Without a heading column each point heads towards the next. Raises InputError naming the line that cannot be used.
-    """
-    path = _existing(path, "route")
-    suffix = path.suffix.lower()
-    if suffix not in (".csv", ".bin"):
-        raise InputError(
-            f"{path}: unknown kind of route {suffix!r}; give .csv ({','.join(ROUTE_HEADER)}) or AntWorld .bin"
-        )
-    try:
-        if suffix == ".csv":
-            return _read_route_csv(path)
-        x, y, heading = _read_planes(path, 3, "an AntWorld route")
-        return Route(np.column_stack([x / 100, y / 100, np.radians(heading)]))
-    except csv.Error as error:
-        raise InputError(f"{path} cannot be read as CSV ({error}); is it a route?") from error
-    except InputError as error:
-        raise _naming(path, error) from error
-
-
-def write_route(route: Route, path: str | os.PathLike) -> None:
-    """Write a route as CSV (x_m, y_m, heading_deg)."""
-    if Path(path).suffix.lower() != ".csv":
-        raise InputError(f"{path}: a route is written as .csv")
-    rows = np.column_stack([route.xy, np.degrees(route.poses[:, 2])]).tolist()
-    with replacing(path) as partial, partial.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(ROUTE_HEADER)
-        writer.writerows(rows)
-
-
-def _existing(path: str | os.PathLike, kind: str) -> Path:
-    path = Path(path)
-    if not os.path.isfile(path):  # False for names too long, too
-        raise InputError(f"there is no {kind} file {path}; check the name")
-    return path
-
-
-def _naming(path: Path, error: InputError) -> InputError:
-    """The error, with the file that it is about."""
-    message = str(error)
-    return error if message.startswith(str(path)) else InputError(f"{path}: {message}")
-
-
-def _reason(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:160]
-
-
-def _read_planes(path: Path, planes: int, what: str) -> Float[np.ndarray, "planes n"]:
-    """The `planes` consecutive arrays of little-endian float64 that an AntWorld file is."""
-    size = path.stat().st_size
-    if size == 0 or size % (8 * planes):
-        raise InputError(f"{path} has {size} bytes; {what} has a multiple of {8 * planes} (is it truncated?)")
-    return np.fromfile(path, dtype="<f8").reshape(planes, -1)
-
-
 def _read_antworld(path: Path) -> World:
     """An AntWorld `.bin`: planes x0 x1 x2 y0 y1 y2 z0 z1 z2 R G B, drawn in green on sand as its own program does."""
-    planes = _read_planes(path, 12, "an AntWorld world")
+    planes = read_planes(path, 12, "an AntWorld world")
     bad = np.flatnonzero(~(np.abs(planes) <= FARTHEST).all(axis=0))
     if len(bad):
         raise InputError(
@@ -241,40 +153,6 @@ def _read_antworld(path: Path) -> World:
         triangles=np.ascontiguousarray(triangles, dtype=np.float32), rgb=rgb, ground=Ground(ANTWORLD_GROUND, bounds),
         sky_rgb=DEFAULT_SKY, field=bounds,
     )  # fmt: skip
-
-
-def _read_route_csv(path: Path) -> Route:
-    with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
-        reader = csv.reader(file, skipinitialspace=True)
-        header = [name.strip() for name in next(reader, [])]
-        columns = [name for name in ROUTE_HEADER if name in header]
-        if columns[:2] != ROUTE_HEADER[:2]:
-            raise InputError(
-                f"{path}, line 1: the columns are {','.join(header)!r}; a route needs {','.join(ROUTE_HEADER)}"
-            )
-        rows = []
-        for cells in reader:
-            if not any(cell.strip() for cell in cells):
-                continue
-            row = dict(zip(header, cells, strict=False))
-            rows.append([_number(row.get(name, ""), name, path, reader.line_num) for name in columns])
-    if len(rows) < 2:
-        raise InputError(f"{path} holds {len(rows)} point(s); a route needs at least 2")
-    table = np.array(rows)
-    if len(columns) == 2:
-        return Route.through(table)
-    return Route(np.column_stack([table[:, :2], np.radians(table[:, 2])]))
-
-
-def _number(cell: str, name: str, path: Path, line: int) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        unit = "degrees" if name == "heading_deg" else "metres"
-        raise InputError(f"{path}, line {line}: {name} is {cell!r}; a route needs finite {unit}")
-    return value
 
 
 def _to_json(world: World) -> dict[str, Any]:

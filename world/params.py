@@ -6,7 +6,7 @@ from typing import Any
 
 from .errors import InputError
 from .scene import RGB, check_colour
-from .spelling import read_parameters, split_words
+from .specs import parse_parameters, split_words
 
 
 def _number(default: float | int, unit: str, low: float | int, high: float | int) -> Any:
@@ -106,7 +106,7 @@ class WorldParams:
         if name not in PRESETS:
             raise InputError(f"unknown preset {name!r}; known: {', '.join(PRESETS)}")
         try:
-            return dataclasses.replace(PRESETS[name], **read_parameters(words, name, cls))
+            return dataclasses.replace(PRESETS[name], **parse_parameters(words, name, cls))
         except InputError as error:
             raise InputError(f"world {text!r}: {error}") from error
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..learning_options import RunOptions
+from ..cli.run_options import RunOptions
 from ..sweeps.spec import Sweep
 
 # Of every run. All settings of a run stand here, in Benchmark.sweep, or are what entries differ in: no default is relied on.

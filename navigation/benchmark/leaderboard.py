@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
 from .definition import BENCHMARKS
 from .results import ASKED, RESULTS, Result, read_result

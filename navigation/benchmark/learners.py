@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..environment import RouteFollowing
-from ..learning_options import RunOptions
+from ..cli.run_options import RunOptions
+from ..rl.environment import RouteFollowing
 from .definition import BENCHMARK, ENCODING, Benchmark
 from .results import Line, Result, check_free, line_of, result_of, write_result
 

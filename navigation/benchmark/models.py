@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
-from ..familiarity import FamiliarityModel
-from ..learning_options import FILE_SUFFIX
+from ..cli.run_options import FILE_SUFFIX
 from ..models import make_model
+from ..models.base import FamiliarityModel
 from ..sweeps.store import Store
 from ..sweeps.sweep import run_sweep
 from ..sweeps.work import run_key, teach, walk

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from world.errors import InputError
-from world.files import replacing
+from tussock.world.atomic import replacing
+from tussock.world.errors import InputError
 
-from ..learning_options import RunOptions
-from ..rules import NUMBER
+from ..cli.run_options import RunOptions
+from ..stopping import NUMBER
 from ..sweeps.statistics import mean_interval
 from .definition import BENCHMARKS, Benchmark
 

@@ -3,10 +3,10 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from world.errors import InputError
-from world.spelling import read_parameters, split_words
+from tussock.world.errors import InputError
+from tussock.world.specs import parse_parameters, split_words
 
-from ..familiarity import Model
+from .base import Model
 
 if TYPE_CHECKING:
     from .adaboost import AdaBoost
@@ -82,7 +82,7 @@ def make_model(name: str, **parameters) -> Model:
     name, *words = split_words(text := name) or [""]
     try:
         cls = model_class(name.removeprefix(OPPONENT))
-        spelled = read_parameters(words, cls.name, cls)
+        spelled = parse_parameters(words, cls.name, cls)
         if twice := spelled.keys() & parameters.keys():
             raise InputError(f"{', '.join(sorted(twice))} is also given as a keyword; give it once")
         model = cls(**spelled, **parameters)

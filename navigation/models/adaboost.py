@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from jaxtyping import Float32, Float64, UInt8
 
-from world.geometry import columns_of_turn
+from tussock.world.geometry import columns_of_turn
 
-from ..familiarity import Images, Learned, Model, Scans
-from ..rotation import FilterBank, in_parts
+from .base import Images, Learned, Model, Scans
+from .filter_bank import FilterBank, in_parts
 
 NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a threshold unit is sought
 THRESHOLDS = 63  # tried for a filter: quantiles of its responses

@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float32, Int64
 
-from ..familiarity import check_scan
-from ..rotation import FilterBank
+from .base import check_scan
+from .filter_bank import FilterBank
 from .perfect_memory import PerfectMemory, energies
 
 SAMPLE = 32  # snapshots between which the usual difference of unrelated places is measured

@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from ..familiarity import Images, IncrementalModel, Learned, Scans
-from ..rotation import FilterBank
+from .base import Images, IncrementalModel, Learned, Scans
+from .filter_bank import FilterBank
 
 # Presets in use, as eta / N: the rate of one update for `units` units of `inputs` inputs.
 RATES = {

@@ -14,11 +14,11 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from threadpoolctl import threadpool_limits
 from torch.nn.functional import binary_cross_entropy_with_logits, linear
 
-from world.errors import InputError
-from world.geometry import columns_of_turn
+from tussock.world.errors import InputError
+from tussock.world.geometry import columns_of_turn
 
-from ..familiarity import Images, Learned, Model, Scans, check_scan, check_training
-from ..rotation import FilterBank
+from .base import Images, Learned, Model, Scans, check_scan, check_training
+from .filter_bank import FilterBank
 
 ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
     "identity": lambda x: x,

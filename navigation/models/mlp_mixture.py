@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import torch
 from jaxtyping import Int64
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
-from ..familiarity import Images, Learned, Scans
+from .base import Images, Learned, Scans
 from .mlp_rotation import MLPRotation
 
 

@@ -9,10 +9,10 @@ import torch
 from jaxtyping import Float32, Int64
 from torch.nn.functional import log_softmax, pad, relu
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
-from ..familiarity import Images, Learned, Model, Scans
-from ..rotation import FilterBank, all_rotations, bell
+from .base import Images, Learned, Model, Scans
+from .filter_bank import FilterBank, all_rotations, bell
 
 
 @dataclass(kw_only=True, eq=False)

@@ -7,10 +7,10 @@ import torch
 from jaxtyping import Float32
 from torch.nn.functional import embedding_bag
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
-from ..familiarity import Images, IncrementalModel, Learned, Scans
-from ..rotation import FilterBank, smoothed
+from .base import Images, IncrementalModel, Learned, Scans
+from .filter_bank import FilterBank, smoothed
 
 MOST_SHARES = 2**28  # of pixels in fields: 1 GB
 AT_ONCE = 128  # views that are learned

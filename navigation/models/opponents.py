@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 import torch
 
-from ..familiarity import Images, IncrementalModel, Learned, Model, Scans
+from .base import Images, IncrementalModel, Learned, Model, Scans
 
 T = TypeVar("T")
 

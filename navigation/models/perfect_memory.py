@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from jaxtyping import Float32, Int64
 
-from ..familiarity import Images, IncrementalModel, Learned, Scans, check_scan
-from ..rotation import FilterBank, all_rotations, in_parts
+from .base import Images, IncrementalModel, Learned, Scans, check_scan
+from .filter_bank import FilterBank, all_rotations, in_parts
 
 # Squared distances, as the bank finds them, are off by less than this times sqrt(w) (|v|^2 + |s|^2) (measured: a quarter of it).
 ROUNDING = 1e-6

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import UInt64
 
-from ..familiarity import Images, Learned, Model, Scans
+from .base import Images, Learned, Model, Scans
 
 
 @dataclass(kw_only=True, eq=False)

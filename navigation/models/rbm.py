@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import torch
 from torch.nn.functional import softplus
 
-from ..familiarity import Images, Learned, Model, Scans
-from ..rotation import FilterBank
+from .base import Images, Learned, Model, Scans
+from .filter_bank import FilterBank
 
 
 @dataclass(kw_only=True, eq=False)

@@ -3,9 +3,9 @@
 import torch
 from jaxtyping import Int64
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
-from ..familiarity import Images, Learned, Model, Scans
+from .base import Images, Learned, Model, Scans
 from .perfect_memory import PerfectMemory
 
 

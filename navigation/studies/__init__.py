@@ -1,1 +1,0 @@
-"""The studies of the thesis, as functions from panoramas to tables; pictures and the report are drawn from the tables alone."""

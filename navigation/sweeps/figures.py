@@ -6,11 +6,11 @@ from jaxtyping import UInt8
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from world.geometry import Route
-from world.scene import World
+from tussock.world.geometry import Route
+from tussock.world.scene import World
 
-from ..plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR
-from ..studies.drawing import GOOD_COLOUR, SOFT_COLOUR, canvas, draw_route, panorama, plan
+from ..reports.plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR
+from ..studies.thesis.drawing import GOOD_COLOUR, SOFT_COLOUR, canvas, draw_route, panorama, plan
 from .statistics import MEASURES, Interval, by_axis, spoken, words
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from render.renderer import open_renderer
-from world.errors import InputError
-from world.files import replacing
+from tussock.render.renderer import open_renderer
+from tussock.world.atomic import replacing
+from tussock.world.errors import InputError
 
 from ..failures import CAUSES, Evidence, in_words
-from ..pages import page, picture
-from ..studies.findings import plain
-from ..studies.report import RESULTS as REPLICATED
+from ..reports.findings import plain
+from ..reports.page import page, picture
+from ..studies.thesis.report import RESULTS as REPLICATED
 from ..training import training_views
 from .figures import along_axis, seen, walked
 from .spec import SETTINGS

@@ -14,10 +14,10 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
-from world.errors import InputError
-from world.params import is_generated
+from tussock.world.errors import InputError
+from tussock.world.params import is_generated
 
-from ..learning_options import FILE_SUFFIX, RunOptions
+from ..cli.run_options import FILE_SUFFIX, RunOptions
 
 MOST_RUNS = 1_000_000
 SETTINGS = {each.name: each for each in dataclasses.fields(RunOptions)}

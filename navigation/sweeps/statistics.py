@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float, Int
 
-from world.params import is_generated
+from tussock.world.params import is_generated
 
 SAMPLES = 4000  # of a bootstrap
 CONFIDENCE = 0.95

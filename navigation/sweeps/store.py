@@ -13,8 +13,8 @@ from typing import Any
 import pandas as pd
 from filelock import FileLock, Timeout
 
-from world.errors import InputError
-from world.files import replacing
+from tussock.world.atomic import replacing
+from tussock.world.errors import InputError
 
 FINISHED, TABLE, LOCK = "finished.sqlite", "runs.parquet", ".lock"
 _COLUMNS = ("key", "settings", "row", "steps", "again")

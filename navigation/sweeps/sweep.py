@@ -14,12 +14,12 @@ from typing import Any
 from distributed import CancelledError, Client, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
-from world.errors import InputError
+from tussock.world.errors import InputError
 
-from ..learning_commands import RunCommand
-from ..learning_options import RunOptions
-from ..options import words_of
-from ..terminal import say
+from ..cli.models import RunCommand
+from ..cli.options import words_of
+from ..cli.run_options import RunOptions
+from ..cli.terminal import say
 from . import work
 from .spec import Sweep
 from .store import Finished, Store, table_of, write_table

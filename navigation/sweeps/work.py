@@ -10,16 +10,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from render.renderer import Renderer, open_renderer
-from world.errors import InputError
-from world.geometry import Route
-from world.params import is_generated
-from world.scene import World
+from tussock.render.renderer import Renderer, open_renderer
+from tussock.world.errors import InputError
+from tussock.world.geometry import Route
+from tussock.world.params import is_generated
+from tussock.world.scene import World
 
+from ..cli.options import PathOptions
+from ..cli.run_options import LearningOptions, Lesson, RunOptions
 from ..failures import CAUSES, Witness
-from ..familiarity import FamiliarityModel
-from ..learning_options import LearningOptions, Lesson, RunOptions
-from ..options import PathOptions
+from ..models.base import FamiliarityModel
 from ..threads import use_threads
 from ..trajectory import Trajectory
 

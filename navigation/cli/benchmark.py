@@ -1,0 +1,69 @@
+"""The command of the test bed. Heavy packages are imported where they are used."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from tussock.world.errors import InputError
+
+from .sweeps import check_workers
+from .terminal import progress, say
+
+
+@dataclass
+class BenchmarkCommand:
+    """Enter models in the test bed: fixed worlds, routes, starts and noise, a result a model, and a leaderboard."""
+
+    model: str | None = None
+    """all, or names separated by commas (see tussock models), after which their parameters may follow."""
+    out: Path = Path("benchmark")
+    """Folder for the runs and, in its folder results, what comes of them; runs that are finished there are not done again."""
+    encoding: str = "edges"
+    """What the models see of a view: edges, grey or sky, or a chain of steps. The eye is the test bed's."""
+    quick: bool = False
+    """A first look: other, fewer runs, whose results compare with no others."""
+    leaderboard: Path | None = None
+    """Only print the table of the results in this folder, an --out or one of results alone."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this command alone."""
+    workers: int | None = None
+    """How many of these. Default: one a core."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from ..benchmark.leaderboard import leaderboard, read_results
+
+        if (self.model is None) == (self.leaderboard is None):
+            raise InputError("give --model NAME to enter a model, or --leaderboard DIR to see the results in a folder")
+        check_workers(self.scheduler, self.workers)
+        if self.leaderboard is not None:
+            return {"table": leaderboard(read_results(self.leaderboard))}
+        files = [str(path) for path in self._enter()]
+        return {"results": files, "table": leaderboard(read_results(self.out))}
+
+    def _enter(self) -> list[Path]:
+        """Enter the models, one after the other; the file of each."""
+        from tussock.world.specs import split_list
+
+        from ..benchmark.definition import BENCHMARK, QUICK
+        from ..benchmark.models import checked_entry, enter_named
+        from ..models import MODELS
+
+        benchmark = QUICK if self.quick else BENCHMARK
+        names = list(MODELS) if self.model == "all" else split_list(self.model or "")
+        files = []
+        for name in dict.fromkeys(map(checked_entry, names)):  # refuses what is none before the work begins
+            say(f"{name}: {len(benchmark)} runs of {benchmark.name}")
+            with progress("walking", "runs", aloud=True) as report:
+                result, path = enter_named(
+                    name, self.out, encoding=self.encoding, benchmark=benchmark, scheduler=self.scheduler,
+                    workers=self.workers, progress=report,
+                )  # fmt: skip
+            errors = [run["error"] for run in result.runs if run["error"] is not None]
+            if errors:
+                say(f"{name}: {len(errors)} of {len(benchmark)} runs could not be done; the first: {errors[0]}")
+            files.append(path)
+        return files

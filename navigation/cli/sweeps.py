@@ -1,0 +1,79 @@
+"""The commands for many runs. Heavy packages are imported where they are used."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from tussock.world.errors import InputError
+
+from .terminal import progress, say
+
+
+@dataclass
+class SweepCommand:
+    """Do every run that a sweep file asks for: models, worlds, starts, noise, in all combinations."""
+
+    sweep: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="SWEEP.toml")]
+    """What to vary and what not (docs/sweeps.md)."""
+    out: Path = Path("sweep")
+    """Folder for the table of runs; runs that are finished there are not done again."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this sweep alone."""
+    workers: int | None = None
+    """How many of these. Default: one a core."""
+    record: Annotated[str | None, tyro.conf.arg(metavar="worst:N")] = None
+    """Keep recordings of the N worst runs."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from ..sweeps.spec import read_sweep
+
+        record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
+        if record is None:
+            raise InputError(f"--record {self.record!r}: give worst:5, or another number")
+        check_workers(self.scheduler, self.workers)
+        sweep = read_sweep(self.sweep)
+
+        from ..sweeps.sweep import record_worst, run_sweep
+
+        say(f"{len(sweep)} runs: {', '.join(f'{len(choices)} of {name}' for name, choices in sweep.axes.items())}")
+        with progress("walking", "runs", aloud=True) as report:
+            done = run_sweep(sweep, self.out, scheduler=self.scheduler, workers=self.workers, progress=report)
+        recorded = record_worst(sweep, self.out, int(record[1])) if self.record else []
+        return done | {"recordings": [str(folder) for folder in recorded]}
+
+
+@dataclass
+class ReportCommand:
+    """Say what the runs of a sweep come to: a page with success and error by each axis, models in pairs, and the worst walks."""
+
+    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
+    """Folder of the sweep; it may still go on."""
+    worst: int = 5
+    """How many of the worst walks to show."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from ..sweeps.report import REPORT, RESULTS, write_sweep_report
+
+        if self.worst < 0:
+            raise InputError(f"--worst {self.worst}: give 0 or more")
+        with progress("drawing", "figures") as report:
+            results = write_sweep_report(self.folder, worst=self.worst, progress=report)
+        return {
+            "report": str(self.folder / REPORT), "results": str(self.folder / RESULTS), "runs": results["runs"],
+            "could_not_run": len(results["could_not_run"]),
+        } | {measure: found["value"] for measure, found in results["measures"].items()}  # fmt: skip
+
+
+def check_workers(scheduler: str | None, workers: int | None) -> None:
+    """Refuse flags that say twice, or wrongly, who does the runs. Raises InputError."""
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: give at least 1")
+    if scheduler is not None and workers is not None:
+        raise InputError("--workers are those on this machine; a scheduler has its own: give one of the two")

@@ -1,0 +1,151 @@
+"""The commands that grow worlds and look at them: a dataclass with a field a flag. Heavy packages are imported where they are used."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from tussock.world.errors import InputError
+
+from .options import WORLD, SightOptions
+from .terminal import say
+
+
+@dataclass
+class WorldCommand:
+    """Grow a world and save it."""
+
+    out: Path
+    """File to write: .glb or .ply."""
+    preset: str = "tussock-field"
+    """tussock-field, meadow, scrub or tiny."""
+    seed: int = 0
+    """The same seed gives the same file."""
+    picture: Path | None = None
+    """Also draw the world from above into this file (.png or .svg)."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from tussock.world.atomic import check_writable
+        from tussock.world.files import write_world
+        from tussock.world.scene import World
+
+        check_writable(self.out)
+        check_picture(self.picture)
+        world = World.generate(self.preset, self.seed)
+        write_world(world, self.out)
+        if self.picture is not None:
+            from ..reports.plots import overview
+
+            overview(world, self.picture, title=f"{self.preset}, seed {self.seed}")
+        return {"world": str(self.out), "preset": self.preset, "seed": self.seed, "triangles": len(world.triangles)}
+
+
+@dataclass
+class ViewCommand(SightOptions):
+    """Draw the panorama seen at a pose."""
+
+    at: Annotated[str | None, tyro.conf.arg(metavar="X,Y,HEADING_DEG")] = None
+    """Where to stand (m) and face (degrees counter-clockwise from +x, east). Default: the middle of the world, facing north."""
+    out: Path = Path("view.png")
+    """PNG to write: ahead in the middle, behind at both edges."""
+    alpha: bool = False
+    """Write RGBA: alpha is the share of each pixel that is not open sky."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        import cv2
+        import numpy as np
+
+        from tussock.world.atomic import check_writable, replacing
+
+        if self.out.suffix.lower() != ".png":
+            raise InputError(f"{self.out}: a view is written as .png")
+        check_writable(self.out)
+        world = self.open_world()
+        x, y, heading_deg = self.place(world.field)
+        with self.open_renderer(world) as renderer:
+            view = renderer.render([(x, y, math.radians(heading_deg))])[0]
+            backend = renderer.backend
+        say(f"renderer: {backend}")
+        image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
+        with replacing(self.out) as partial:
+            partial.write_bytes(
+                cv2.imencode(".png", image if self.alpha else np.ascontiguousarray(image[..., :3]))[1].tobytes()
+            )
+        return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
+
+    def place(self, field) -> tuple[float, float, float]:
+        """x, y (m) and heading (degrees) to look from."""
+        if self.at is None:
+            return (field.x_min + field.x_max) / 2, (field.y_min + field.y_max) / 2, 90.0
+        x, y, heading_deg = numbers(self.at, "--at", "X,Y,HEADING_DEG", "5,5,90")
+        if not (math.isfinite(heading_deg) and field.contains(x, y)):
+            raise InputError(f"--at {self.at}: that is outside the world ({field}); choose a place inside")
+        return x, y, heading_deg
+
+
+@dataclass
+class RouteCommand:
+    """Find a walkable route through a world and save it; several seeds and one goal give several routes to one place."""
+
+    world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
+    seed: int = 0
+    """The same seed gives the same route (and world, where it is generated)."""
+    route_seed: int | None = None
+    """Seed of the route alone. Default: --seed."""
+    length_m: float = 8.0
+    """Length of the route."""
+    goal: Annotated[str | None, tyro.conf.arg(metavar="X,Y")] = None
+    """Where it ends (m), to within a decimetre. Default: anywhere."""
+    out: Path = Path("route.csv")
+    """File to write (.csv)."""
+    picture: Path | None = None
+    """Also draw world and route from above into this file (.png or .svg)."""
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+    def run(self) -> dict[str, Any]:
+        from tussock.world.atomic import check_writable
+        from tussock.world.route_files import write_route
+        from tussock.world.routes import generate_route
+
+        if self.out.suffix.lower() != ".csv":
+            raise InputError(f"{self.out}: a route is written as .csv")
+        check_writable(self.out)
+        check_picture(self.picture)
+        goal = None if self.goal is None else numbers(self.goal, "--goal", "X,Y", "5,5")
+        world = SightOptions(world=self.world, seed=self.seed).open_world()
+        seed = self.seed if self.route_seed is None else self.route_seed
+        route = generate_route(world, seed, self.length_m, goal=goal)
+        write_route(route, self.out)
+        if self.picture is not None:
+            from ..reports.plots import overview
+
+            overview(world, self.picture, route=route, title=f"{self.world}, route {seed}")
+        return {"route": str(self.out), "length_m": route.length, "start": route.start[:2], "goal": route.goal[:2]}
+
+
+def numbers(text: str, flag: str, form: str, example: str) -> tuple[float, ...]:
+    """Numbers separated by commas, as many as the form has."""
+    try:
+        found = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) != form.count(",") + 1:
+        raise InputError(f"{flag} {text!r}: give {form}, for example {example}")
+    return found
+
+
+def check_picture(path: Path | None) -> None:
+    """Refuse a picture that could not be written after the work. Raises InputError."""
+    from tussock.world.atomic import check_writable
+
+    if path is not None:
+        check_writable(path)
+        if path.suffix.lower() not in (".png", ".svg"):
+            raise InputError(f"{path}: a picture from above is written as .png or .svg")

@@ -1,0 +1,40 @@
+"""Which rotations a scan looks at, and the turn to the most familiar of them."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from tussock.world.errors import InputError
+from tussock.world.geometry import turn_of_columns, wrap_angle
+
+
+def scan_window(width: int, angle: float, centre: float = 0.0) -> Bool[np.ndarray, " width"]:
+    """Which rotations a scan of `angle` (rad, full width) about `centre` (rad to the left of the present heading) looks at."""
+    if not 0 < angle <= 2 * np.pi + 1e-9:
+        raise InputError(f"a scan of {np.degrees(angle):g} degrees; give over 0 and up to 360")
+    away = np.abs(wrap_angle(turn_of_columns(np.arange(width), width) - centre))
+    allowed = away <= angle / 2 + 1e-9
+    allowed[away.argmin()] = True  # a window narrower than a column still looks somewhere
+    return allowed
+
+
+def best_turn(
+    familiarity: Float[np.ndarray, "n w"], window: Bool[np.ndarray, "... w"] | None = None, interpolate: bool = True
+) -> Float[np.ndarray, " n"]:
+    """The turn (rad, left positive) to the most familiar rotation of each scan; the first of equal ones.
+
+    window: rotations to choose from (see `scan_window`), the same for all scans or one row each; None is all of them.
+    With `interpolate`, the peak of the parabola through the best rotation and its neighbours, which is finer than a column.
+    """
+    n, width = familiarity.shape
+    if n == 0:
+        return np.empty(0)
+    within = familiarity if window is None else np.where(window, familiarity, -np.inf)
+    best = within.argmax(axis=1)
+    columns = best.astype(float)
+    if interpolate:
+        rows = np.arange(n)
+        left, peak, right = (familiarity[rows, (best + step) % width].astype(float) for step in (-1, 0, 1))
+        bend = left - 2 * peak + right
+        local_peak = (left <= peak) & (right <= peak) & (bend < 0)
+        columns += np.where(local_peak, 0.5 * (left - right) / np.where(local_peak, bend, 1.0), 0.0)
+    return turn_of_columns(columns, width)

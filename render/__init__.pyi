@@ -1,0 +1,3 @@
+from .eye import Eye as Eye
+from .renderer import Renderer as Renderer
+from .renderer import open_renderer as open_renderer

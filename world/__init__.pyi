@@ -1,0 +1,12 @@
+from .errors import InputError as InputError
+from .files import open_world as open_world
+from .files import read_world as read_world
+from .files import write_world as write_world
+from .geometry import Bounds as Bounds
+from .geometry import Pose as Pose
+from .geometry import Route as Route
+from .route_files import read_route as read_route
+from .route_files import write_route as write_route
+from .routes import generate_route as generate_route
+from .scene import Ground as Ground
+from .scene import World as World
