@@ -21,7 +21,7 @@ from tussock.world.scene import World
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
 from .gl import Context, Framebuffer, open_context
-from .renderer import Poses, as_poses
+from .poses import Poses, as_poses
 
 NEAR = 1e-4  # m; what is nearer to the eye is not seen. Nothing is too far.
 

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from tussock.world.atomic import replacing
 from tussock.world.errors import InputError
 
-from ..renderer import Poses, as_poses
+from ..poses import Poses, as_poses
 
 ENTRIES = "database_entries.csv"
 METADATA = "database_metadata.yaml"

@@ -17,7 +17,8 @@ from tussock.world.atomic import replacing
 from tussock.world.errors import InputError
 from tussock.world.geometry import FARTHEST, Bounds
 
-from ..renderer import Poses, Renderer
+from ..poses import Poses
+from ..renderer import Renderer
 from .database import HEADING, Database, X, Y, Z, read_database
 from .files import (
     ENTRIES,
