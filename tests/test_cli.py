@@ -303,7 +303,7 @@ BAD = {
     "a pose outside": (["view", "--world", "tiny", "--at", "99,0,0"], "outside the world"),
     "a pose that is none": (["view", "--world", "tiny", "--at", "1,2"], "X,Y,HEADING_DEG"),
     "a NaN pose": (["view", "--world", "tiny", "--at", "nan,2,0"], "outside the world"),
-    "size 0": (["view", "--world", "tiny", "--size", "0x0"], "0 x 0 pixels"),
+    "size 0": (["view", "--world", "tiny", "--size", "0x0"], "width is 0"),
     "a size that is none": (["run", *SMALL, "--size", "big", "--out", "r"], "columns x rows"),
     "an unknown model": (
         ["run", *SMALL, "--model", "oracle", "--out", "r"],

@@ -15,7 +15,8 @@ from tussock.navigation.models import make_model
 from tussock.navigation.models.files import load_model
 from tussock.render import Eye, open_renderer
 from tussock.render.images.database import read_database, read_image
-from tussock.render.images.files import ENTRIES, METADATA, read_entries
+from tussock.render.images.entries import ENTRIES, read_entries
+from tussock.render.images.metadata import METADATA
 from tussock.world.errors import InputError
 from tussock.world.files import read_world
 from tussock.world.routes import generate_route

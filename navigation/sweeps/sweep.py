@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import logging
-import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from typing import Any
 from distributed import CancelledError, Client, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
+from tussock.render.cores import core_count
 from tussock.world.errors import InputError
 
 from ..cli.models import RunCommand
@@ -142,7 +142,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
     with ExitStack() as stack:
         if scheduler is None:
             local: Any = LocalCluster(
-                n_workers=workers or len(os.sched_getaffinity(0)), threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                n_workers=workers or core_count(), threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
                 worker_dashboard_address="127.0.0.1:0", memory_limit=None, silence_logs=logging.CRITICAL,
                 preload=[work.__name__],
             )  # fmt: skip
