@@ -49,6 +49,6 @@ class Eye:
         return self.samples or (1 if self.width >= 360 else 4)
 
     def elevations(self, rays: int = 1) -> Float[np.ndarray, " height_rays"]:
-        """Elevations of the row centres (rad), top row first. rays: of them to each row, evenly spaced."""
+        """Elevations of evenly spaced rows of rays (rad), from top to bottom, `rays` of them in each row of pixels."""
         n = self.height * rays
         return self.top - (np.arange(n) + 0.5) * (self.top - self.bottom) / n

@@ -129,7 +129,7 @@ def _key(nearness, label):
 
 
 @compiled(error_model="numpy")
-def _draw_spans(count, places, spans, tangents, view, keys):
+def _draw_spans(count, pairs, spans, tangents, view, keys):
     """Draw `count` spans of rows, see `_draw`."""
     lows, highs, bases, slopes, first_rows, last_rows = spans[0], spans[1], spans[2], spans[3], spans[4], spans[5]
     pad, height = 1e-6 + _ATAN_ERROR * view.rows_per_rad, view.height
@@ -137,7 +137,7 @@ def _draw_spans(count, places, spans, tangents, view, keys):
         first_rows[s] = np.ceil(_row(highs[s], view) - pad)
         last_rows[s] = np.floor(_row(lows[s], view) + pad)
     for s in range(count):
-        low, high, base, slope, j, label = lows[s], highs[s], bases[s], slopes[s], np.uintp(places[0, s]), places[1, s]
+        low, high, base, slope, j, label = lows[s], highs[s], bases[s], slopes[s], np.uintp(pairs[0, s]), pairs[1, s]
         first = np.int64(min(max(first_rows[s], 0.0), float(height)))
         last = np.int64(min(max(last_rows[s], -1.0), height - 1.0))
         # Both are right or one row too far out, or more where rows are finer than the approximation.
@@ -205,12 +205,12 @@ def _draw(triangles, directions, tangents, view, keys):
     """Draw all triangles. Boxes are visited from near to far, so that near ones hide far ones.
 
     directions: (2, width) cosines and sines of the azimuths of the columns in the world. Spans are collected and drawn together; each has
-    a column and a label (places), least and greatest tangent, base and slope of the inverse distance, and two rows to work in (spans).
+    a column and a label (pairs), least and greatest tangent, base and slope of the inverse distance, and two rows to work in (spans).
     """
     corners, labels, boxes, cull = triangles
     width, start, stop, leaves = view.width, view.start, view.stop, boxes.shape[0] // 2
     corner_columns, firsts, lasts = np.empty((3, LEAF)), np.empty(LEAF, np.int64), np.empty(LEAF, np.int64)
-    places, spans = np.empty((2, _SPANS), np.int64), np.empty((6, _SPANS))
+    pairs, spans = np.empty((2, _SPANS), np.int64), np.empty((6, _SPANS))
     stack, size = np.ones(64, np.int64), 1  # boxes to visit, at first the box of all
     while size:
         size -= 1
@@ -243,13 +243,13 @@ def _draw(triangles, directions, tangents, view, keys):
                 wrapped = column - width if column >= width else column
                 cos, sin = directions[0, np.uintp(wrapped)], directions[1, np.uintp(wrapped)]
                 low, high = _covered(ab, bc, ca, cos, sin)
-                places[0, count], places[1, count] = wrapped, labels[i]
+                pairs[0, count], pairs[1, count] = wrapped, labels[i]
                 spans[0, count], spans[1, count], spans[2, count], spans[3, count] = low, high, gx * cos + gy * sin, gz
                 count += (low <= high) & (wrapped >= start) & (wrapped < stop)
                 if count == _SPANS:
-                    _draw_spans(count, places, spans, tangents, view, keys)
+                    _draw_spans(count, pairs, spans, tangents, view, keys)
                     count = 0
-        _draw_spans(count, places, spans, tangents, view, keys)
+        _draw_spans(count, pairs, spans, tangents, view, keys)
 
 
 @compiled

@@ -175,7 +175,7 @@ def read_image(path: Path) -> UInt8[np.ndarray, "height width channels"]:
 
 def _check_exists(path: Path) -> None:
     if not os.path.isfile(path):  # unlike Path.is_file, False for names that are too long
-        raise FileError(f"there is no image {path}; `tussock database check` lists the missing ones")
+        raise FileError(f"there is no image {path}; a check of the database lists all that are missing")
 
 
 def _size(view: np.ndarray) -> str:

@@ -46,7 +46,7 @@ def grid_axes_error(database: Database, rows: Int[np.ndarray, " m"], seed: int =
     Args:
         database: A grid.
         rows: Rows with readable images of one size, which are unwrapped panoramas.
-        seed: Of the choice of pairs.
+        seed: Seed of the choice of pairs.
 
     Returns:
         A sentence, or None if the axes are right or that is undetermined.
