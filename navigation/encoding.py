@@ -17,7 +17,9 @@ from tussock.world.registry import Registry
 from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import EncodingStep, Images, Normalise, Resize, Views
 
-STEPS = Registry("encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN})
+STEPS = Registry(
+    "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
+)
 OLD_NAMES = {"sky-mask": "foreground-mask"}  # of steps; files and people may still use them
 PRESETS = {
     "grey": "grey | {blur}{resize}",
@@ -46,7 +48,9 @@ class Encoding:
                 where = "at the beginning only" if place else "after one that takes views, such as grey"
                 raise SettingError(f"encoding {str(self)!r}: {label(step)!r} can stand {where}")
             if normalised and getattr(step, "takes_unit_range", False):
-                raise SettingError(f"encoding {str(self)!r}: {label(step)} takes values from 0 to 1; put it before normalise")
+                raise SettingError(
+                    f"encoding {str(self)!r}: {label(step)} takes values from 0 to 1; put it before normalise"
+                )
             normalised = normalised or isinstance(step, Normalise)
 
     def __call__(self, views: Views) -> Float32[torch.Tensor, "n h w"]:

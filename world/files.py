@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from .atomic import replacing
-from .errors import InputError
+from .errors import FileError, InputError
 from .geometry import FARTHEST, Bounds
 from .mesh_materials import face_rgb, texture_of
-from .params import PRESETS, is_generated
+from .params import PRESETS, WorldParams, is_generated
 from .route_files import existing, naming, read_planes, reason
 from .scene import Ground, World
 
@@ -36,6 +36,14 @@ def open_world(name: str, seed: int = 0) -> World:
     if not Path(name).suffix and not Path(name).exists():
         raise InputError(f"unknown world {name!r}; give one of {', '.join(PRESETS)}, or a file")
     return read_world(name)
+
+
+def check_world(name: str | os.PathLike) -> None:
+    """Refuse a world that is neither a preset with good parameters nor a file, before long work. Raises InputError."""
+    if is_generated(str(name)):
+        WorldParams.named(str(name))
+    elif not Path(name).is_file():
+        raise FileError(f"there is no world {str(name)!r}; give one of {', '.join(PRESETS)}, or a file")
 
 
 def read_world(path: str | os.PathLike) -> World:

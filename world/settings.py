@@ -76,6 +76,16 @@ def choice(default: str, names: Iterable[str]) -> Any:
     return attrs.field(default=default, validator=check, metadata={"choices": known})
 
 
+def text(default: Any = attrs.NOTHING, *, optional: bool = False) -> Any:
+    """A field for a text that can be printed. optional: None is allowed."""
+
+    def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
+        if not ((optional and value is None) or (isinstance(value, str) and value.isprintable())):
+            refuse(instance, attribute, value, "a text that can be printed")
+
+    return attrs.field(default=default, validator=check)
+
+
 def switch(default: bool) -> Any:
     """A field for True or False."""
     return instance_of(bool, default, "True or False")
