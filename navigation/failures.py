@@ -13,6 +13,7 @@ from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
 from tussock.world.geometry import Pose, Route, columns_of_turn, wrap_angle
 
+from .encoding import Encoding
 from .evaluation import RECOVERED_DEG
 from .models.files import TrainedModel
 from .models.perfect_memory import PerfectMemory
@@ -92,15 +93,19 @@ class Diagnosis:
 class Diagnostics:
     """Measures why the steps of a walk are poor."""
 
-    def __init__(self, renderer: Renderer, trained: TrainedModel, route: Route):
+    def __init__(self, renderer: Renderer, trained: TrainedModel | None, route: Route):
         """Prepare for walks along a route.
 
         Args:
             renderer: The one that the walk uses.
-            trained: What the walk follows. Where the poses of its views are unknown, nothing about learned views is measured.
+            trained: What the walk follows. Where it is None, or the poses of its views are unknown, nothing about learned views is
+                measured.
             route: The route that the walk is to follow.
         """
-        self._renderer, self._trained, self._route = renderer, trained, route
+        self._renderer, self._route = renderer, route
+        self._learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None
+        if trained is not None and trained.poses is not None and trained.encoding is not None:
+            self._learned = trained.encoding, trained.poses
 
     def examine(self, step: Step) -> Diagnosis | None:
         """What is measured at a poor or failed step; None for a good one, which costs nothing.
@@ -123,19 +128,20 @@ class Diagnostics:
         return float(wrap_angle(step.pose.heading + step.turn - np.arctan2(y - step.pose.y, x - step.pose.x)))
 
     def _nearest(self, pose: Pose) -> float | None:
-        if self._trained.poses is None:
+        if self._learned is None:
             return None
-        return float(np.hypot(*(self._trained.poses[:, :2] - pose[:2]).T).min())
+        _, poses = self._learned
+        return float(np.hypot(*(poses[:, :2] - pose[:2]).T).min())
 
     def _recognised(self, step: Step) -> float | None:
-        if self._trained.poses is None or self._trained.encoding is None:
+        if self._learned is None:
             return None
-        poses, match = self._trained.poses, step.match
+        (encoding, poses), match = self._learned, step.match
         if match is None:  # the model keeps no views: take the learned view that looks most like this one
             if step.view is None:
                 return None
             memory, poses = self._memory
-            _, index = memory.match(self._trained.encoding(step.view[None]))
+            _, index = memory.match(encoding(step.view[None]))
             width = index.shape[1]
             match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
         return float(np.hypot(*(poses[match, :2] - step.pose[:2])))
@@ -143,9 +149,9 @@ class Diagnostics:
     @cached_property
     def _memory(self) -> tuple[PerfectMemory, Float[np.ndarray, "m 3"]]:
         """A memory of all learned views, and their poses."""
-        assert self._trained.encoding is not None
-        assert self._trained.poses is not None
-        views, poses = training_views(self._trained.encoding, self._renderer, self._trained.poses)
+        assert self._learned is not None
+        encoding, poses = self._learned
+        views, poses = training_views(encoding, self._renderer, poses)
         return PerfectMemory().fit(views), poses
 
 

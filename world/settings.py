@@ -24,7 +24,16 @@ from .errors import SettingError
 T = TypeVar("T")
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(attrs.field,))
+def converted(*, default: Any, converter: Callable[..., Any], takes_self: bool = False) -> Any:
+    """A field whose value, the default included, is made by a converter, which raises SettingError for what it cannot use.
+
+    takes_self: the converter also gets the object, with the fields before this one.
+    """
+    convert = attrs.Converter(converter, takes_self=True) if takes_self else converter
+    return attrs.field(default=default, converter=convert)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(attrs.field, converted))
 def settings(cls: type[T]) -> type[T]:
     """Class decorator: a frozen class of keyword fields, which are checked when it is made."""
     return attrs.frozen(kw_only=True, slots=False)(cls)

@@ -141,9 +141,10 @@ def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
 
 def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
     """The line of a run, from its results by name."""
-    asked = {name: settings_of(experiment)[name] for name in ASKED}
-    names = [each.name for each in attrs.fields(Line) if each.name not in ASKED]
-    return Line(**asked, **{name: results.get(name) for name in names} | {"arrived": bool(results.get("arrived"))})
+    settings = settings_of(experiment)
+    values: dict[str, Any] = {name: settings[name] for name in ASKED}
+    values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in ASKED}
+    return Line(**values | {"arrived": bool(results.get("arrived"))})
 
 
 def result_of(
@@ -216,7 +217,9 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
         if not lines:
             raise ValueError("no runs")
         times = {name: float(seconds) for name, seconds in content["times"].items()}
-        rest = {name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")}
+        rest: dict[str, Any] = {
+            name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")
+        }
         result = Result(**rest | {"encoding": current_encoding(rest["encoding"])}, runs=lines, times=times)
         scores = json.loads(json.dumps(result.scores()))
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError) as error:
