@@ -282,7 +282,7 @@ def test_presets_from_outside_work_by_location_and_by_entry_point(tmp_path):
     parts = (
         "trees is -1",
         "no parameter 'trees'; its parameters are stones",
-        "'int'",
+        "of type int",
         "'my_presets:nothing'",
         "'my_presets:USE'",
     )

@@ -104,7 +104,7 @@ class World:
             return made
         if not isinstance(made, WorldParams):
             raise SettingError(
-                f"the world {params!r} is {type(made).__name__!r}; a preset returns WorldParams or a World"
+                f"the world {params!r} gives an object of type {type(made).__name__}; a preset returns WorldParams or a World"
             )
         triangles, rgb = generate_plants(made, seed)
         return cls(

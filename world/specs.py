@@ -72,7 +72,9 @@ def parse_spec(text: str, find: Callable[[str], Callable[..., Any]]) -> Spec:
     name, *words = split_words(text) or [""]
     target = find(name)
     if not callable(target):
-        raise SettingError(f"{name!r} is {type(target).__name__!r}, not a class or function; name one that makes it")
+        raise SettingError(
+            f"{name!r} is of type {type(target).__name__}, not a class or function; name one that makes it"
+        )
     parameters = parse_parameters(words, name, target)
     defaults = own_parameters(target)
     return Spec(name, target, {key: value for key, value in parameters.items() if value != defaults.get(key, ...)})
