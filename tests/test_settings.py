@@ -15,12 +15,14 @@ from tussock.world.settings import (
     RGB,
     choice,
     colour,
+    converted,
     describe,
     instance_of,
     number,
     numbers,
     settings,
     switch,
+    text,
     whole,
     wholes,
 )
@@ -37,6 +39,7 @@ class Body:
     rgb: RGB = colour((1, 2, 3))
     gait: str = choice("tripod", ("tripod", "wave"))
     blind: bool = switch(False)
+    label: str | None = text(None, optional=True)
     parent: Any = instance_of((dict, type(None)), None, "a dict or None")
 
 
@@ -50,6 +53,7 @@ ACCEPTED = {
     "rgb": ((0, 255, 7), [np.uint8(4), 5, 6]),
     "gait": ("wave",),
     "blind": (True,),
+    "label": ("an ant", "", None),
     "parent": ({},),
 }
 REFUSED = {
@@ -62,6 +66,7 @@ REFUSED = {
     "rgb": ((1, 2), (1, 2, 3, 4), (1, 2, 256), (1, 2, -1), (1, 2, 2.5), 3, "red", (True, 1, 1)),
     "gait": ("gallop", "", None, 3, np.array(["wave", "wave"])),
     "blind": (0, 1, "yes", None),
+    "label": ("two\nlines", "\0", 3, b"ant"),
     "parent": ([], 3),
 }
 
@@ -151,6 +156,19 @@ def test_a_class_is_called_by_its_name_where_it_has_one():
 
     with pytest.raises(SettingError, match=r"^mushroom-body: cells is 0"):
         Model(cells=0)
+
+
+def test_a_converted_field_makes_its_default_too_and_sees_the_fields_before_it():
+    @settings
+    class Walk:
+        legs: int = whole(6)
+        gait: str = converted(
+            default="tripod", converter=lambda value, walk: f"{value} on {walk.legs}", takes_self=True
+        )
+        steps: int = converted(default="3", converter=int)
+
+    assert (Walk().gait, Walk().steps) == ("tripod on 6", 3)
+    assert Walk(legs=8, gait="wave", steps="4") == attrs.evolve(Walk(legs=8, gait="wave"), gait="wave", steps=4)
 
 
 def test_describe_gives_default_unit_and_range_or_choices():

@@ -26,9 +26,12 @@ MAX_WHOLE = 2**62  # what an int64 holds, with room to add; errors do not mentio
 
 
 def converted(*, default: Any, converter: Callable[..., Any], takes_self: bool = False) -> Any:
-    """A field whose value, the default included, is made by a converter, which raises SettingError for what it cannot use.
+    """A field whose value is made by a converter, which raises SettingError for an invalid one.
 
-    takes_self: the converter also gets the object, with the fields before this one.
+    Args:
+        default: Value that is converted where none is given.
+        converter: Makes the value of the field.
+        takes_self: Whether the converter also gets the object, with the fields before this one.
     """
     convert = attrs.Converter(converter, takes_self=True) if takes_self else converter
     return attrs.field(default=default, converter=convert)
@@ -112,11 +115,11 @@ def choice(default: str, names: Iterable[str]) -> Any:
 
 
 def text(default: Any = attrs.NOTHING, *, optional: bool = False) -> Any:
-    """A field for a text that can be printed. optional: None is allowed."""
+    """A field for a printable text. optional: Whether None is allowed."""
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
         if not ((optional and value is None) or (isinstance(value, str) and value.isprintable())):
-            refuse(instance, attribute, value, "a text that can be printed")
+            refuse(instance, attribute, value, "a printable text" + " or None" * optional)
 
     return attrs.field(default=default, validator=check)
 
