@@ -1,7 +1,7 @@
-"""Models side by side: the same route, the same eye, the same encoding."""
+"""Models compared: the same route, the same eye, the same encoding."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,59 +9,80 @@ from jaxtyping import Float
 
 from tussock.render.renderer import Renderer
 from tussock.world.geometry import Route
+from tussock.world.specs import Spec
 
-from .encoding import Encoding
-from .evaluation import errors_on, views_east
-from .models.base import Model
-from .training import training_poses, training_views
-from .walk import ARRIVED, Agent
+from .evaluation import encoded_views, errors_of_views, facing_east
+from .experiment import Experiment
+from .models.base import memory_bytes
+from .stopping import StopReason
+from .training import training_views
+from .walk import check_inside
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """What one model does.
+    """What one model achieves.
 
-    Errors of the headings it recovers beside the route over the full circle (degrees), having learned the views on it; whether
-    it then walks the route home, having learned those of a learning walk. memory_bytes and fit_seconds are of the first
-    training, scan_ms of one view at all rotations, in batches.
+    Attributes:
+        median_error_deg: Of the headings that it recovers near the route over the full circle, trained on the route's views alone.
+        mean_error_deg: The same, mean.
+        share_over_45: The same, share of errors over 45 degrees.
+        arrived: Whether it then walks the route home, trained with the learning walk.
+        memory_bytes: Size of what it learned in the first training; None where the model does not tell.
+        fit_seconds: Of the first training.
+        scan_ms: Time of one view at all rotations, in batches.
     """
 
     median_error_deg: float
     mean_error_deg: float
     share_over_45: float
     arrived: bool
-    memory_bytes: int
+    memory_bytes: int | None
     fit_seconds: float
     scan_ms: float
 
 
 def compare_models(
-    models: Iterable[Callable[[], Model]], *, encoding: Encoding, renderer: Renderer, route: Route, route_views: Route,
-    positions: Float[np.ndarray, "n 2"], every: int = 1, learning_walk: float = 0.2, offset: float = 0.1, seed: int = 0,
-) -> Iterator[Comparison]:  # fmt: skip
-    """Train and test models, one after the other. Each is made twice, by calling it: for the headings, and for the walk.
+    models: Iterable[Spec],
+    experiment: Experiment,
+    renderer: Renderer,
+    route: Route,
+    positions: Float[np.ndarray, "n 2"],
+) -> Iterator[Comparison]:
+    """Train and test models, one after the other. Each is made twice: for the headings, and for the walk.
 
-    positions: where headings are recovered. every: learn one route view in so many. learning_walk: its reach (m). offset: how far to
-    the left of the route the walk starts (m).
+    Args:
+        models: The models.
+        experiment: How they are trained, and how they walk.
+        renderer: Of the experiment's world, for its eye.
+        route: Through it.
+        positions: (n, 2) Where headings are recovered (m).
     """
-    field = renderer.world.field
-    on_route, _ = training_views(encoding, renderer, training_poses(route_views, every=every))
-    poses = training_poses(route_views, every=every, learning_walk=learning_walk, field=field)
-    beside, _ = training_views(encoding, renderer, poses)
-    seen = list(views_east(encoding, renderer, positions))
-    east = np.column_stack([positions, np.zeros(len(positions))])
-    for make in models:
-        model = make()
+    check_inside(experiment.start(route), renderer.world.field)
+    encoding = experiment.encoding
+    on_route = experiment.replace(training__learning_walk=0.0)
+    views_on_route, views_around = (
+        training_views(encoding, renderer, each.training_poses(renderer.world, route))[0]
+        for each in (on_route, experiment)
+    )
+    route_views, poses = route.resampled(experiment.training.spacing), facing_east(positions)
+    views = list(encoded_views(encoding, renderer, poses))
+    for spec in models:
+        model = spec.make(seed=experiment.seed, device=experiment.device)
         began = time.perf_counter()
-        model.fit(on_route)
+        model.fit(views_on_route)
         fitted = time.perf_counter()
-        found = errors_on(model, seen, route_views, east)
+        errors = errors_of_views(model, views, route_views, poses)
         scanned = time.perf_counter()
-        walker = make().fit(beside)
-        agent = Agent(renderer=renderer, encoding=encoding, model=walker, route=route, seed=seed)
-        *_, last = agent.walk(agent.start(offset))
+        navigator = experiment.navigator.make(model=spec.make(seed=experiment.seed, device=experiment.device))
+        navigator.learn(views_around)
+        *_, (last,) = experiment.walk(renderer, route).steps(navigator)
         yield Comparison(
-            median_error_deg=found.median_error_deg, mean_error_deg=found.mean_error_deg, share_over_45=found.share_over_45,
-            arrived=last.reason == ARRIVED, memory_bytes=model.memory_bytes, fit_seconds=fitted - began,
+            median_error_deg=errors.median_error_deg,
+            mean_error_deg=errors.mean_error_deg,
+            share_over_45=errors.share_over_45,
+            arrived=last is not None and last.reason == StopReason.ARRIVED,
+            memory_bytes=memory_bytes(model),
+            fit_seconds=fitted - began,
             scan_ms=1000 * (scanned - fitted) / len(positions),
-        )  # fmt: skip
+        )

@@ -1,4 +1,4 @@
-"""How well a model recovers headings: pure functions from worlds and models to numbers."""
+"""How well a model recovers headings at positions near a route."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -8,23 +8,28 @@ import torch
 from jaxtyping import Float, Float32
 
 from tussock.render.renderer import Renderer
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Route, wrap_angle
+from tussock.world.progress import Progress, no_progress
 
 from .encoding import Encoding
 from .models.base import FamiliarityModel, Images
 from .scan import best_turn, scan_window
 
-BATCH = 64  # views rendered, encoded and scored at once
+BATCH = 64  # views rendered, encoded and compared at once
 RECOVERED_DEG = 45.0  # a heading less than this off counts as recovered
+MAX_POSITIONS = 10**6
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeadingErrors:
-    """Recovered headings at positions beside a route, and how far off they are (equations 2 and 3 of the thesis).
+    """Recovered headings at positions near a route, and their errors (equations 2 and 3 of the thesis).
 
-    positions: (n, 2) m. headings: recovered (rad). nearest: index of the nearest route view (place recognition, 4.3.2), whose
-    heading is the set one. errors: absolute difference between the two (rad, 0..pi).
+    Attributes:
+        positions: (n, 2) m.
+        headings: (n,) Recovered (rad).
+        nearest: (n,) Index of the nearest route view, whose heading is the right one (place recognition, section 4.3.2).
+        errors: (n,) Absolute difference between the two (rad, 0..pi).
     """
 
     positions: Float[np.ndarray, "n 2"]
@@ -46,22 +51,32 @@ class HeadingErrors:
 
 
 def grid_positions(route: Route, *, grid: float, within: float, field: Bounds) -> Float[np.ndarray, "n 2"]:
-    """The multiples of `grid` (m) in both axes that lie within `within` (m) of the route and inside the field."""
+    """Grid positions near a route.
+
+    Args:
+        route: The route.
+        grid: Positions are the multiples of this in x and y (m).
+        within: Greatest distance from the route (m).
+        field: Positions outside of it are left out.
+
+    Raises:
+        SettingError: Where there are none, or over a million.
+    """
     if not (np.isfinite(grid) and grid > 0):
-        raise InputError(f"a grid of {grid} m; give a spacing over 0")
+        raise SettingError(f"a grid of {grid} m; give a spacing over 0")
     if not (np.isfinite(within) and within >= 0):
-        raise InputError(f"positions within {within} m of the route; give a finite distance")
+        raise SettingError(f"positions within {within} m of the route; give a finite distance")
     low = np.ceil((route.xy.min(axis=0) - within) / grid).astype(int)
     high = np.floor((route.xy.max(axis=0) + within) / grid).astype(int)
-    if (high - low + 1).prod() > 10**6:
-        raise InputError(f"a grid of {grid:g} m has over a million positions around this route; give a wider one")
+    if (high - low + 1).prod() > MAX_POSITIONS:
+        raise SettingError(f"a grid of {grid:g} m has over a million positions around this route; give a wider one")
     x, y = np.meshgrid(np.arange(low[0], high[0] + 1) * grid, np.arange(low[1], high[1] + 1) * grid)
     xy = np.column_stack([x.ravel(), y.ravel()])
     distance, _ = route.nearest(xy) if len(xy) else (np.empty(0), None)
     xy = xy[(distance <= within) & field.contains(xy[:, 0], xy[:, 1])]
     if len(xy) == 0:
-        raise InputError(
-            f"no multiple of {grid:g} m lies within {within:g} m of the route; give a finer grid or more room"
+        raise SettingError(
+            f"no multiple of {grid:g} m lies within {within:g} m of the route; give a finer grid or a greater distance"
         )
     return xy
 
@@ -71,25 +86,35 @@ def nearest_view(route: Route, positions: Float[np.ndarray, "n 2"]) -> np.ndarra
     return np.hypot(*(positions[:, None] - route.xy).transpose(2, 0, 1)).argmin(axis=1)
 
 
-def views_east(
-    encoding: Encoding, renderer: Renderer, positions: Float[np.ndarray, "n 2"]
-) -> Iterator[Float32[torch.Tensor, "m h w"]]:
-    """What is seen at the positions, encoded, in batches.
+def facing_east(positions: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
+    """Poses at positions that all face east, so that the right turns do not fall on whole columns by construction."""
+    return np.column_stack([positions, np.zeros(len(positions))])
 
-    All views face east, so that the answer is not on the grid of rotations by construction.
-    """
-    for start in range(0, len(positions), BATCH):
-        part = positions[start : start + BATCH]
-        yield encoding(renderer.render(np.column_stack([part, np.zeros(len(part))])))
+
+def encoded_views(
+    encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"]
+) -> Iterator[Float32[torch.Tensor, "m h w"]]:
+    """The encoded views at poses, in batches."""
+    for start in range(0, len(poses), BATCH):
+        yield encoding(renderer.render(poses[start : start + BATCH]))
 
 
 def recovered_headings(
-    model: FamiliarityModel, views: Images, facing: Float[np.ndarray, " n"], *, scan: float = 2 * np.pi,
+    model: FamiliarityModel,
+    views: Images,
+    facing: Float[np.ndarray, " n"],
+    *,
+    scan: float = 2 * np.pi,
     about: Float[np.ndarray, " n"] | None = None,
-) -> Float[np.ndarray, " n"]:  # fmt: skip
-    """The most familiar headings (rad) at places whose views were taken facing `facing`.
+) -> Float[np.ndarray, " n"]:
+    """The most familiar headings (rad) of views.
 
-    scan: width of the scan (rad), centred on the headings `about`, which a full one does not need.
+    Args:
+        model: A trained model.
+        views: (n, h, w) Encoded views.
+        facing: (n,) Heading at which each was taken (rad).
+        scan: Full width of the scan (rad).
+        about: (n,) Heading in the middle of each scan (rad); a full scan does not need it.
     """
     if len(views) == 0:
         return np.empty(0)
@@ -100,31 +125,50 @@ def recovered_headings(
 
 
 def heading_errors(
-    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, route: Route, positions: Float[np.ndarray, "n 2"],
-    *, scan: float = 2 * np.pi, progress=lambda done, total: None,
-) -> HeadingErrors:  # fmt: skip
-    """Let a trained model recover the heading at each position and compare it with the nearest route view's.
+    model: FamiliarityModel,
+    encoding: Encoding,
+    renderer: Renderer,
+    route: Route,
+    positions: Float[np.ndarray, "n 2"],
+    *,
+    scan: float = 2 * np.pi,
+    progress: Progress = no_progress,
+) -> HeadingErrors:
+    """Let a trained model recover the heading at each position, and compare it with the nearest route view's.
 
-    scan: width of the scan (rad), about the set heading where it is not full. progress(done, total) is called now and then.
+    Args:
+        model: The trained model.
+        encoding: That of the views it learned.
+        renderer: Draws the views at the positions.
+        route: Its points are the route views.
+        positions: (n, 2) m.
+        scan: Full width of the scan (rad), about the right heading where it is not full.
+        progress: Called with how many positions are done, of how many.
     """
-    poses = np.column_stack([positions, np.zeros(len(positions))])
-    wanted = route.poses[nearest_view(route, positions), 2]
-    views = views_east(encoding, renderer, positions)
-    return errors_on(model, views, route, poses, scan=scan, about=wanted, progress=progress)
+    poses = facing_east(positions)
+    views = encoded_views(encoding, renderer, poses)
+    about = route.poses[nearest_view(route, positions), 2]
+    return errors_of_views(model, views, route, poses, scan=scan, about=about, progress=progress)
 
 
-def errors_on(
-    model: FamiliarityModel, views: Iterable[Images], route: Route, poses: Float[np.ndarray, "n 3"],
-    *, scan: float = 2 * np.pi, about: Float[np.ndarray, " n"] | None = None, progress=lambda done, total: None,
-) -> HeadingErrors:  # fmt: skip
+def errors_of_views(
+    model: FamiliarityModel,
+    views: Iterable[Images],
+    route: Route,
+    poses: Float[np.ndarray, "n 3"],
+    *,
+    scan: float = 2 * np.pi,
+    about: Float[np.ndarray, " n"] | None = None,
+    progress: Progress = no_progress,
+) -> HeadingErrors:
     """`heading_errors` from encoded views, in batches, that were taken at poses; see `recovered_headings` for the scan."""
-    found, done = [np.empty(0)], 0
+    headings, done = [np.empty(0)], 0
     for batch in views:
         part = slice(done, done + len(batch))
-        about_here = None if about is None else about[part]
-        found.append(recovered_headings(model, batch, poses[part, 2], scan=scan, about=about_here))
+        middle = None if about is None else about[part]
+        headings.append(recovered_headings(model, batch, poses[part, 2], scan=scan, about=middle))
         done = part.stop
         progress(done, len(poses))
-    headings, nearest = np.concatenate(found), nearest_view(route, poses[:, :2])
-    errors = np.abs(wrap_angle(headings - route.poses[nearest, 2]))
-    return HeadingErrors(positions=poses[:, :2], headings=headings, nearest=nearest, errors=errors)
+    recovered, nearest = np.concatenate(headings), nearest_view(route, poses[:, :2])
+    errors = np.abs(wrap_angle(recovered - route.poses[nearest, 2]))
+    return HeadingErrors(positions=poses[:, :2], headings=recovered, nearest=nearest, errors=errors)

@@ -1,29 +1,37 @@
-"""Which rotations a scan looks at, and the turn to the most familiar of them."""
+"""Scanning: which rotations of a view are compared, and the turn to the most familiar of them."""
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 from tussock.world.geometry import turn_of_columns, wrap_angle
 
 
 def scan_window(width: int, angle: float, centre: float = 0.0) -> Bool[np.ndarray, " width"]:
-    """Which rotations a scan of `angle` (rad, full width) about `centre` (rad to the left of the present heading) looks at."""
+    """Which rotations of a view a scan compares.
+
+    Args:
+        width: Columns of the view, which is the number of rotations.
+        angle: Full width of the scan (rad), over 0 and up to a whole turn.
+        centre: Direction of its middle (rad to the left of the present heading).
+    """
     if not 0 < angle <= 2 * np.pi + 1e-9:
-        raise InputError(f"a scan of {np.degrees(angle):g} degrees; give over 0 and up to 360")
+        raise SettingError(f"a scan of {np.degrees(angle):g} degrees; give over 0 and up to 360")
     away = np.abs(wrap_angle(turn_of_columns(np.arange(width), width) - centre))
-    allowed = away <= angle / 2 + 1e-9
-    allowed[away.argmin()] = True  # a window narrower than a column still looks somewhere
-    return allowed
+    window = away <= angle / 2 + 1e-9
+    window[away.argmin()] = True  # a window narrower than a column still has one rotation
+    return window
 
 
 def best_turn(
     familiarity: Float[np.ndarray, "n w"], window: Bool[np.ndarray, "... w"] | None = None, interpolate: bool = True
 ) -> Float[np.ndarray, " n"]:
-    """The turn (rad, left positive) to the most familiar rotation of each scan; the first of equal ones.
+    """The turn (rad, left positive) to the most familiar rotation of each view; the first of equal ones.
 
-    window: rotations to choose from (see `scan_window`), the same for all scans or one row each; None is all of them.
-    With `interpolate`, the peak of the parabola through the best rotation and its neighbours, which is finer than a column.
+    Args:
+        familiarity: Of each rotation of each view.
+        window: Rotations to choose from (see `scan_window`), the same for all views or one row each; None is all of them.
+        interpolate: Take the peak of the parabola through the best rotation and its neighbours, which is finer than a column.
     """
     n, width = familiarity.shape
     if n == 0:

@@ -1,38 +1,47 @@
-"""How many threads the libraries below work on."""
+"""How many threads torch and the libraries of linear algebra work on, for a while."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from threading import Lock
 
 import torch
 from threadpoolctl import threadpool_limits
 
-from tussock.world.errors import InputError
 
-
-def use_threads(count: int) -> None:
-    """Have torch and the libraries of linear algebra work on `count` threads from here on. Raises InputError for under 1."""
-    if count < 1:
-        raise InputError(f"{count} threads; give at least 1")
+@contextmanager
+def threads(count: int | None) -> Iterator[None]:
+    """Within the block, torch and the libraries of linear algebra work on `count` threads; None changes nothing."""
+    if count is None:
+        yield
+        return
+    before = torch.get_num_threads()
     torch.set_num_threads(count)
-    threadpool_limits(count)
+    try:
+        with threadpool_limits(count):
+            yield
+    finally:
+        torch.set_num_threads(before)
 
 
-class OneTorchThread:
-    """While any walk goes on, torch works on one thread: its others wait for more to do in a way that keeps the cores busy, and the
-    renderer needs them. The last walk to end gives torch its threads back.
+_lock, _inside, _before = Lock(), 0, 1
+
+
+@contextmanager
+def one_torch_thread() -> Iterator[None]:
+    """Within the block, torch works on one thread: waiting threads of torch would keep the cores busy that the renderer needs.
+
+    torch has one count for the whole process, so blocks of several threads of Python share it: the last one to end restores it.
     """
-
-    walks, threads = 0, 1
-    lock = Lock()
-
-    def __enter__(self) -> None:
-        with OneTorchThread.lock:
-            if OneTorchThread.walks == 0:
-                OneTorchThread.threads = torch.get_num_threads()
-                torch.set_num_threads(1)
-            OneTorchThread.walks += 1
-
-    def __exit__(self, kind, error, at) -> None:
-        with OneTorchThread.lock:
-            OneTorchThread.walks -= 1
-            if OneTorchThread.walks == 0:
-                torch.set_num_threads(OneTorchThread.threads)
+    global _inside, _before
+    with _lock:
+        if _inside == 0:
+            _before = torch.get_num_threads()
+            torch.set_num_threads(1)
+        _inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if _inside == 0:
+                torch.set_num_threads(_before)

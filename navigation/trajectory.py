@@ -1,10 +1,11 @@
-"""A walk in numbers: the collected steps without their views."""
+"""A walk in numbers: its steps without their views."""
 
 import csv
 import io
 import os
 from collections import Counter
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from jaxtyping import Float
 
 from tussock.world.atomic import replacing
 
-from .failures import CAUSES, Evidence, cause, walk_cause
-from .walk import ARRIVED, Step
+from .failures import Cause, Diagnosis, walk_cause
+from .stopping import StopReason
+from .walk import Step
 
 COLUMNS = (
     "step", "x_m", "y_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
@@ -23,24 +25,40 @@ COLUMNS = (
 
 @dataclass
 class Trajectory:
-    """Where an agent went. `add` each step as it comes."""
+    """The steps of one agent. `add` each step as it comes.
 
-    rows: list[tuple] = field(default_factory=list)  # one a step, in the order of COLUMNS
+    Attributes:
+        rows: One for each step, in the order of COLUMNS.
+    """
 
-    def add(self, step: Step, evidence: Evidence | None = None) -> None:
-        """Append one step, and what a `Witness` has to say of it."""
-        self.rows.append((
-            step.index, step.pose.x, step.pose.y, float(np.degrees(step.pose.heading)), float(np.degrees(step.turn)),
-            float(step.familiarity.max()), step.deviation, step.along, float(np.degrees(step.error)),
-            "" if step.match is None else step.match, "" if step.place is None else step.place, step.reset or "", step.reason or "",
-            *_cells(evidence),
-        ))  # fmt: skip
+    rows: list[tuple] = field(default_factory=list)
+
+    def add(self, step: Step, diagnosis: Diagnosis | None = None) -> None:
+        """Append a step, and what `Diagnostics` measured there."""
+        scanned = None if step.familiarity is None else float(step.familiarity[step.scanned].max())
+        row = (
+            step.index,
+            step.pose.x,
+            step.pose.y,
+            float(np.degrees(step.pose.heading)),
+            float(np.degrees(step.turn)),
+            scanned,
+            step.deviation,
+            step.along,
+            float(np.degrees(step.error)),
+            step.match,
+            step.progress,
+            step.reset,
+            step.reason,
+            *_measured(diagnosis),
+        )
+        self.rows.append(tuple(map(_plain, row)))
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def column(self, name: str) -> list:
-        """The values of one of COLUMNS."""
+        """The values of one of COLUMNS; empty texts where nothing is known."""
         return [row[COLUMNS.index(name)] for row in self.rows]
 
     @property
@@ -49,24 +67,30 @@ class Trajectory:
         return np.array([row[1:3] for row in self.rows]).reshape(-1, 2)
 
     def summary(self) -> dict[str, Any]:
-        """What became of the walk: arrived, reason, steps, mean and maximal deviation (m), mean absolute heading error (degrees),
-        resets; why it failed (None where it arrived without a reset), how many steps were poor or failed, and how often for each cause.
+        """The walk in a few numbers.
+
+        Returns:
+            arrived, reason, steps, mean_deviation_m, max_deviation_m, mean_error_deg (absolute), resets; cause: why it failed (None
+            where it arrived without a reset); poor_steps: how many were poor or failed; causes: how many for each cause.
+            A trajectory without steps has the reason None and None in place of means.
         """
-        deviation, resets = np.array(self.column("deviation_m")), self.column("reset")
-        reason, causes = self.column("reason")[-1], self.column("cause")
-        failed = [*(reset != "" for reset in resets[1:]), reason not in ("", ARRIVED)]
+        deviation, errors = np.array(self.column("deviation_m")), np.abs(self.column("error_deg"))
+        reason = self.column("reason")[-1] or None if self.rows else None
+        resets, causes = [value != "" for value in self.column("reset")], self.column("cause")
+        failed = [*resets[1:], reason not in (None, StopReason.ARRIVED)]
         counts = Counter(label for label in causes if label)
+        walked = bool(self.rows)
         return {
-            "arrived": reason == ARRIVED,
+            "arrived": reason == StopReason.ARRIVED,
             "reason": reason,
-            "steps": len(self) - 1,
-            "mean_deviation_m": float(deviation.mean()),
-            "max_deviation_m": float(deviation.max()),
-            "mean_error_deg": float(np.abs(self.column("error_deg")).mean()),
-            "resets": sum(reset != "" for reset in resets),
-            "cause": walk_cause(self.column("along_m"), causes, failed),
+            "steps": max(0, len(self) - 1),
+            "mean_deviation_m": float(deviation.mean()) if walked else None,
+            "max_deviation_m": float(deviation.max()) if walked else None,
+            "mean_error_deg": float(errors.mean()) if walked else None,
+            "resets": sum(resets),
+            "cause": walk_cause(self.column("along_m"), causes, failed) if walked else None,
             "poor_steps": counts.total(),
-            "causes": {label: counts[label] for label in CAUSES if counts[label]},
+            "causes": {cause.value: counts[cause] for cause in Cause if counts[cause]},
         }
 
     def to_csv(self) -> str:
@@ -83,9 +107,14 @@ class Trajectory:
             partial.write_text(self.to_csv(), encoding="utf-8", newline="")
 
 
-def _cells(evidence: Evidence | None) -> tuple:
-    """The last of COLUMNS; empty where nothing was poor, or not measured."""
-    if evidence is None:
-        return ("",) * 5
-    measured = (evidence.covered, evidence.nearest, evidence.recognised, float(np.degrees(evidence.turning)))
-    return (*("" if value is None else value for value in measured), cause(evidence))
+def _plain(value: Any) -> Any:
+    """A value of a row; an empty text where nothing is known."""
+    return "" if value is None else value.value if isinstance(value, StrEnum) else value
+
+
+def _measured(diagnosis: Diagnosis | None) -> tuple:
+    """The last of COLUMNS."""
+    if diagnosis is None:
+        return (None,) * 5
+    turning = float(np.degrees(diagnosis.turning))
+    return diagnosis.covered, diagnosis.nearest, diagnosis.recognised, turning, diagnosis.cause

@@ -1,238 +1,252 @@
-"""The loop: look, scan, turn to the most familiar heading, step."""
+"""The closed loop: look, decide, move, stop. The only place where an agent moves.
+
+    walk = Walk(renderer=renderer, encoding=encoding, route=route, starts=[route.start])
+    for (step,) in walk.steps(navigator):
+        print(step.pose, step.deviation, step.reason)
+
+The walk knows where its agents are, and so measures how far off the route they are; the navigator gets only what they perceive.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import torch
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float32, UInt8
 
 from tussock.render.renderer import Renderer
-from tussock.world.errors import InputError
-from tussock.world.geometry import Pose, Route, columns_of_turn, wrap_angle
+from tussock.world.errors import SettingError
+from tussock.world.geometry import Bounds, Pose, Route, wrap_angle
 
+from .body import Body
 from .encoding import Encoding
-from .models.base import FamiliarityModel, SequenceModel, SnapshotModel
-from .scan import best_turn, scan_window
-from .stopping import (
-    ARRIVED,
-    LOST,
-    OUT_OF_STEPS,
-    OUT_OF_WORLD,
-    STUCK,
-    Progress,
-    Rules,
-    check_distance,
-    check_limits,
-    check_noise,
-)
-from .threads import OneTorchThread
+from .steering.navigator import Look, Motion, Navigator
+from .stopping import StoppingRules, StopReason
+from .threads import one_torch_thread
 
-__all__ = ["ARRIVED", "LOST", "OUT_OF_STEPS", "OUT_OF_WORLD", "STUCK", "Agent", "Step"]
+RECOVERABLE = (
+    StopReason.LOST,
+    StopReason.STUCK,
+    StopReason.OUT_OF_WORLD,
+)  # from where an agent can be put back on the route
 
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One look around and what came of it.
+    """One look of an agent, and what it did then.
 
-    index: 0 for the first look. pose: where the agent stands and faces as it looks. view: what it sees, RGBA.
-    familiarity: of every rotation, turned left by 0, 1, .. columns. aim: turn to the most familiar heading (rad, left positive).
-    turn: the one it makes, which is the aim and noise.
-    match: index of the learned view it recognised, None where the model keeps none.
-    place: share of the learned sequence, 0 to 1, that the model believes to have walked; None where it does not know.
-    deviation: distance from the route (m). along: how far along the route the nearest place is (m).
-    error: how far the chosen heading is from the route's there (rad, -pi..pi).
-    reason: None while the walk goes on, else why it ends. reset: why the agent was put back on the route before this look, or None.
-    failure: why it fails here, whether the walk ends or the agent is put back after this look; None where it does not fail.
+    Attributes:
+        index: 0 for the first look.
+        pose: Where the agent stands and faces as it looks.
+        view: (height, width, 4) What it sees, RGBA; None where it was not drawn.
+        familiarity: (w,) Of every rotation, turned left by 0, 1, .. columns; None where the navigator does not scan.
+        scanned: (w,) Which of these rotations the navigator compared; None likewise.
+        aim: Turn that the navigator decided on (rad, left positive).
+        turn: Turn that the body made: the aim and noise (rad).
+        match: Index of the learned view that was recognised; None where the model keeps none.
+        progress: Share of the learned sequence, 0 to 1, that the navigator believes to have walked; None where it does not know.
+        deviation: Distance from the route (m).
+        along: Distance along the route of the point nearest to the agent (m).
+        error: Angle from the route's heading there to the agent's new heading (rad, -pi..pi).
+        reason: Why the walk ends here; None while it goes on.
+        reset: Why the agent was put back on the route before this look; None where it was not.
+        failure: Why it fails here, whether the walk ends or the agent is put back after this look; None where it does not fail.
     """
 
     index: int
     pose: Pose
-    view: UInt8[np.ndarray, "height width 4"]
-    familiarity: Float[np.ndarray, " w"]
+    view: UInt8[np.ndarray, "height width 4"] | None
+    familiarity: Float32[np.ndarray, " w"] | None
+    scanned: Bool[np.ndarray, " w"] | None
     aim: float
     turn: float
     match: int | None
-    place: float | None
+    progress: float | None
     deviation: float
     along: float
     error: float
-    reason: str | None
-    reset: str | None
-    failure: str | None
+    reason: StopReason | None
+    reset: StopReason | None
+    failure: StopReason | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class AgentSettings:
-    """How an agent walks, and when a walk ends.
+class Walk:
+    """Agents that follow one route side by side, under the same rules.
 
-    step_length (m). scan: width of the scan (rad), about the present heading, or about the world direction `scan_about` (rad).
-    heading_noise: standard deviation of the normal noise on every turn (rad), drawn from `seed`.
-    arrive: the walk is done within this distance of the route's end (m); where the route ends as near to its start, once the
-    agent has been farther away.
-    lost: farther than this from the route is lost (m). patience: metres walked without getting farther along the route before
-    the agent counts as stuck. max_steps: None takes as many as walk the route's length three times.
-    reset_when_lost: instead of ending the walk, put a lost, stuck or straying agent back on the route at the waypoint after the
-    furthest one reached, facing along it, as Ardin et al. (2016) count errors. waypoint_spacing (m).
-    Raises InputError for what is no distance, angle or number of steps.
+    What they see is drawn, encoded and compared together, which takes a fraction of the time; each takes the steps that it takes
+    alone (but for rounding, where the model keeps no views).
     """
 
-    step_length: float = 0.05
-    scan: float = np.pi
-    scan_about: float | None = None
-    heading_noise: float = 0.0
-    arrive: float = 0.15
-    lost: float = 0.5
-    patience: float = 3.0
-    max_steps: int | None = None
-    reset_when_lost: bool = False
-    seed: int = 0
-    waypoint_spacing: float = 0.1
+    def __init__(
+        self,
+        *,
+        renderer: Renderer,
+        encoding: Encoding,
+        route: Route,
+        starts: Sequence[Pose],
+        body: Body | None = None,
+        stopping: StoppingRules | None = None,
+        noise: int | Sequence[np.random.Generator] = 0,
+    ):
+        """Put agents at the start of a walk.
 
-    def __post_init__(self):
-        check_distance("waypoint_spacing", self.waypoint_spacing)
-        check_limits(self)
-        check_noise(self.heading_noise)
-        scan_window(4, self.scan)  # refuses what is no angle
-        if self.scan_about is not None and not np.isfinite(self.scan_about):
-            raise InputError(
-                f"a scan about {self.scan_about}; give a finite direction, or None for the present heading"
-            )
+        Args:
+            renderer: Draws what they see.
+            encoding: What is kept of a view.
+            route: The route that they are to follow.
+            starts: Where each of them begins.
+            body: How they move.
+            stopping: When each walk ends.
+            noise: What the noise on the turns is drawn from: a generator for each agent, or a seed (agent k takes seed + k).
 
-
-@dataclass(frozen=True, kw_only=True)
-class Agent(AgentSettings):
-    """Follows a route by familiarity.
-
-    How far along the route the agent is, is where the route is nearest: a route that crosses itself can be cut short there.
-    """
-
-    renderer: Renderer
-    encoding: Encoding
-    model: FamiliarityModel
-    route: Route
-
-    @cached_property
-    def rules(self) -> Rules:
-        """When its walks end."""
-        return Rules(
-            route=self.route, field=self.renderer.world.field, step_length=self.step_length, arrive=self.arrive, lost=self.lost,
-            patience=self.patience, max_steps=self.max_steps,
-        )  # fmt: skip
+        Raises:
+            SettingError: For a start outside of the world.
+        """
+        self.renderer, self.encoding, self.route = renderer, encoding, route
+        self.body, self.stopping = body or Body(), stopping or StoppingRules()
+        self.field = renderer.world.field
+        self.step_limit = self.stopping.step_limit(route.length, self.body.step_length)
+        generators = [np.random.default_rng(noise + k) for k in range(len(starts))] if isinstance(noise, int) else noise
+        self.agents = [Walker(self, *each) for each in zip(range(len(starts)), starts, generators, strict=True)]
+        self._views: UInt8[np.ndarray, "n height width 4"] | None = None
+        self._measure(self.agents)
 
     @property
-    def step_limit(self) -> int:
-        """The number of steps after which the walk ends."""
-        return self.rules.step_limit
+    def walking(self) -> list["Walker"]:
+        """The agents whose walk goes on."""
+        return [agent for agent in self.agents if not agent.ended]
 
-    def start(self, offset: float = 0.0) -> Pose:
-        """The route's first pose, moved `offset` metres to its left (negative: right)."""
-        pose = self.route.start.moved(0.0, offset)
-        self.rules.check_inside(pose)
-        return pose
+    def steps(self, navigator: Navigator) -> Iterator[list[Step | None]]:
+        """Walk until all have arrived or failed: at a time, one `Step` for each agent; None for those whose walk has ended before."""
+        memories = [navigator.begin() for _ in self.agents]
+        while walking := self.walking:
+            look = self.look()
+            with one_torch_thread():
+                motion = navigator.decide(look, [memories[agent.number] for agent in walking])
+            yield self.move(motion)
 
-    def walk(self, start: Pose) -> Iterator[Step]:
-        """Walk from `start` until arrival or failure, a `Step` at a time; the last one has a `reason`."""
-        for (step,) in self.walk_many([start]):
-            assert step is not None
-            yield step
+    def look(self) -> Look:
+        """What the agents whose walk goes on perceive."""
+        poses = np.array([agent.pose for agent in self.walking])
+        self._views = self.renderer.render(poses)
+        return Look(views=self.encoding(self._views), compass=poses[:, 2])
 
-    def walk_many(self, starts: Sequence[Pose]) -> Iterator[list[Step | None]]:
-        """Walk from each start, all side by side: at a time a list of one `Step` a start, None where that walk has ended.
+    def move(self, motion: Motion) -> list[Step | None]:
+        """Let the agents whose walk goes on move, and measure where they come to; a row of the motion for each of them."""
+        walking = self.walking
+        steps: list[Step | None] = [None] * len(self.agents)
+        for row, agent in enumerate(walking):
+            steps[agent.number] = agent.step(motion, row, None if self._views is None else self._views[row])
+        self._views = None
+        self._measure([agent for agent in walking if not agent.ended])
+        return steps
 
-        What they see is drawn, encoded and scanned together, which takes a fraction of the time. Walk k draws its noise from
-        `seed` + k and takes the steps that it takes alone with that seed (but for rounding, where the model keeps no views).
-        Until the last one ends, torch works on one thread.
-        """
-        for start in starts:
-            self.rules.check_inside(start)
-        walks = [_Walk(self, start, self.seed + k) for k, start in enumerate(starts)]
-        with OneTorchThread():
-            for index in range(self.step_limit + 1):
-                going = [k for k, walk in enumerate(walks) if not walk.ended]
-                if not going:
-                    return
-                steps: list[Step | None] = [None] * len(walks)
-                for k, step in zip(going, self._steps(index, [walks[k] for k in going]), strict=True):
-                    steps[k] = step
-                yield steps
-
-    def _steps(self, index: int, walks: "list[_Walk]") -> Iterator[Step]:
-        """The next step of each of several walks."""
-        poses = np.array([walk.pose for walk in walks])
-        views = self.renderer.render(poses)
-        features = self.encoding(views)
-        width = features.shape[2]
-        windows = self._windows(width, poses[:, 2])
-        familiarity, match = self._scan(features, windows, walks)
-        aims = best_turn(familiarity, windows)
-        deviation, along = self.route.nearest(poses[:, :2])
-        towards = self.route.at(along)[:, 2]
-        columns = np.rint(columns_of_turn(aims, width)).astype(int) % width
-        for k, walk in enumerate(walks):
-            yield walk.step(
-                index, views[k], familiarity[k], aim=float(aims[k]), match=None if match is None else int(match[k, columns[k]]),
-                deviation=float(deviation[k]), along=float(along[k]), towards=float(towards[k]),
-            )  # fmt: skip
-
-    def _scan(
-        self, features: torch.Tensor, windows: np.ndarray, walks: "list[_Walk]"
-    ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Familiarity of every rotation of each view, and which learned view each resembles, if the model knows."""
-        followings = [walk.following for walk in walks if walk.following is not None]
-        if followings:
-            looks = [each.look(view, window) for each, view, window in zip(followings, features, windows, strict=True)]
-            familiarity, match = (torch.stack(each) for each in zip(*looks, strict=True))
-        elif isinstance(self.model, SnapshotModel):
-            familiarity, match = self.model.match(features)
-        else:
-            return self.model.scan(features).cpu().numpy(), None
-        return familiarity.cpu().numpy(), match.cpu().numpy()
-
-    def _windows(self, width: int, headings: Float[np.ndarray, " n"]) -> Bool[np.ndarray, "n w"]:
-        """Which rotations agents that face `headings` look at."""
-        if self.scan_about is None:
-            return np.tile(scan_window(width, self.scan), (len(headings), 1))
-        return np.stack([scan_window(width, self.scan, float(wrap_angle(self.scan_about - each))) for each in headings])
-
-    def _waypoint_after(self, along: float) -> float:
-        """Distance along the route of the first waypoint beyond `along`."""
-        return min((np.floor(along / self.waypoint_spacing + 1e-9) + 1) * self.waypoint_spacing, self.route.length)
+    def _measure(self, agents: Sequence["Walker"]) -> None:
+        """Find where agents have come to, and whether their walks end there."""
+        if agents:
+            deviation, along = self.route.nearest(np.array([agent.pose[:2] for agent in agents]))
+            headings = self.route.at(along)[:, 2]
+            for agent, *measured in zip(agents, deviation.tolist(), along.tolist(), headings.tolist(), strict=True):
+                agent.measure(*measured)
 
 
-class _Walk:
-    """Where one walk of an agent has come to."""
+class Walker:
+    """Where one agent of a walk is, and what it has done so far."""
 
-    def __init__(self, agent: Agent, start: Pose, seed: int):
-        self.agent, self.pose = agent, start
-        self.random = np.random.default_rng(seed)
-        self.following = agent.model.follow() if isinstance(agent.model, SequenceModel) else None
-        self.progress = Progress(agent.rules)
-        self.reset: str | None = None
-        self.ended = False
+    def __init__(self, walk: Walk, number: int, start: Pose, random: np.random.Generator):
+        check_inside(start, walk.field)
+        self.walk, self.number, self.random = walk, number, random
+        self.pose = Pose(start.x, start.y, float(wrap_angle(start.heading)))
+        self.progress = Progress(walk.stopping, walk.route, walk.field, walk.body.step_length)
+        self.index, self.ended = 0, False
+        self.reset: StopReason | None = None
 
-    def step(
-        self, index: int, view: np.ndarray, familiarity: np.ndarray, *, aim: float, match: int | None, deviation: float, along: float,
-        towards: float,
-    ) -> Step:  # fmt: skip
-        """The step that follows from a look, taken. towards: the route's heading here (rad)."""
-        agent, pose = self.agent, self.pose
-        turn = float(wrap_angle(aim + agent.heading_noise * self.random.standard_normal()))
-        reason = self.progress.look(index, pose, deviation, along)
-        recovering = agent.reset_when_lost and reason in (LOST, STUCK, OUT_OF_WORLD) and index < agent.step_limit
+    def measure(self, deviation: float, along: float, route_heading: float) -> None:
+        """Take in how far it is from the route (m) and along it (m), and the route's heading there (rad)."""
+        self.deviation, self.along, self.route_heading = deviation, along, route_heading
+        self.reason = self.progress.check(self.pose, deviation, along)
+        if self.reason is None and self.index >= self.walk.step_limit:
+            self.reason = StopReason.OUT_OF_STEPS
+
+    def step(self, motion: Motion, row: int, view: np.ndarray | None) -> Step:
+        """Do as a row of a motion says."""
+        stopping, body, pose, scan = self.walk.stopping, self.walk.body, self.pose, motion.scan
+        aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
+        noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
+        turn = float(wrap_angle(aim + noise))
+        put_back = stopping.put_back and self.reason in RECOVERABLE and self.index < self.walk.step_limit
         step = Step(
-            index=index, pose=pose, view=view, familiarity=familiarity, aim=aim, turn=turn, match=match,
-            place=None if self.following is None else self.following.place,
-            deviation=deviation, along=along, error=float(wrap_angle(pose.heading + turn - towards)),
-            reset=self.reset, reason=None if recovering else reason, failure=None if reason == ARRIVED else reason,
-        )  # fmt: skip
-        if recovering:
-            self.progress.put(agent._waypoint_after(self.progress.furthest))
-            self.pose, self.reset = Pose(*agent.route.at(self.progress.furthest)[0].tolist()), reason
-        elif reason:
-            self.ended = True
-        else:
-            self.pose, self.reset = pose.turned(turn).moved(agent.step_length), None
-            self.progress.step()
+            index=self.index,
+            pose=pose,
+            view=view,
+            familiarity=None if scan is None else scan.familiarity[row],
+            scanned=None if scan is None else scan.window[row],
+            aim=aim,
+            turn=turn,
+            match=None if scan is None or scan.match is None else int(scan.match[row]),
+            progress=None if scan is None else scan.progress[row],
+            deviation=self.deviation,
+            along=self.along,
+            error=float(wrap_angle(pose.heading + turn - self.route_heading)),
+            reason=None if put_back else self.reason,
+            reset=self.reset,
+            failure=None if self.reason is StopReason.ARRIVED else self.reason,
+        )
+        self.reset = self.reason if put_back else None
+        self.ended = step.reason is not None
+        if put_back:
+            self.pose = self.progress.put_back()
+        elif not self.ended:
+            self.pose = pose.turned(turn).moved(share * body.step_length)
+            self.progress.walked(share)
+        self.index += 1
         return step
+
+
+class Progress:
+    """How far one agent has come along a route, and whether its walk ends for that.
+
+    Attributes:
+        furthest: Greatest distance along the route that it has reached (m).
+        since: Steps that it has made since it got there, in whole steps.
+    """
+
+    def __init__(self, stopping: StoppingRules, route: Route, field: Bounds, step_length: float):
+        self.stopping, self.route, self.field, self.step_length = stopping, route, field, step_length
+        self.furthest, self.since = -np.inf, 0.0
+        self.been_away = not self._at_goal(route.start)  # where the route ends near its start, it must leave first
+
+    def check(self, pose: Pose, deviation: float, along: float) -> StopReason | None:
+        """Why the walk ends at a pose, this far from the route and along it (m); None where it goes on."""
+        if along > self.furthest:
+            self.furthest, self.since = along, 0.0
+        self.been_away = self.been_away or not self._at_goal(pose)
+        if self.been_away and self._at_goal(pose):
+            return StopReason.ARRIVED
+        if not self.field.contains(pose.x, pose.y):
+            return StopReason.OUT_OF_WORLD
+        if deviation > self.stopping.max_deviation:
+            return StopReason.LOST
+        return StopReason.STUCK if self.since * self.step_length >= self.stopping.patience else None
+
+    def walked(self, share: float) -> None:
+        """Count a step, which is this share of a whole one."""
+        self.since += share
+
+    def put_back(self) -> Pose:
+        """Go on from the waypoint after the furthest point that was reached; its pose."""
+        spacing = self.stopping.waypoint_spacing
+        self.furthest = min((np.floor(self.furthest / spacing + 1e-9) + 1) * spacing, self.route.length)
+        self.since = 0.0
+        return Pose(*self.route.at(self.furthest)[0].tolist())
+
+    def _at_goal(self, pose: Pose) -> bool:
+        goal = self.route.goal
+        return bool(np.hypot(pose.x - goal.x, pose.y - goal.y) <= self.stopping.arrival_radius)
+
+
+def check_inside(pose: Pose, field: Bounds) -> None:
+    """Refuse a start that is outside of the world. Raises SettingError."""
+    if not np.isfinite(pose).all() or not field.contains(pose.x, pose.y):
+        raise SettingError(
+            f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
+        )

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.errors import SettingError
-from tussock.world.geometry import FARTHEST
+from tussock.world.geometry import MAX_COORDINATE
 from tussock.world.settings import number, settings, whole
 
 MAX_RAYS = 10**8  # of a panorama; the CPU renderer uses 12 bytes a ray and thread
@@ -30,7 +30,7 @@ class Eye:
     height: int = whole(150, low=1, high=16384, unit="pixels")
     top: float = number(math.radians(60.0), low=-math.pi / 2, high=math.pi / 2, unit="rad")
     bottom: float = number(math.radians(-15.0), low=-math.pi / 2, high=math.pi / 2, unit="rad")
-    z: float = number(0.01, low=-FARTHEST, high=FARTHEST, unit="m")
+    z: float = number(0.01, low=-MAX_COORDINATE, high=MAX_COORDINATE, unit="m")
     samples: int | None = whole(None, low=1, high=64, optional=True)
 
     def __attrs_post_init__(self):

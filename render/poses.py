@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import SettingError
-from tussock.world.geometry import FARTHEST, Pose
+from tussock.world.geometry import MAX_COORDINATE, Pose
 
 Poses = Float[np.ndarray, "n 3"] | Sequence[Pose | Sequence[float] | Float[np.ndarray, "3"]]
 Views = UInt8[np.ndarray, "n height width 4"]
@@ -19,7 +19,7 @@ def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
         poses: Rows of x (m), y (m) and heading (rad).
 
     Raises:
-        SettingError: A value is not a number, not finite or beyond FARTHEST, or there are not three in each row.
+        SettingError: A value is not a number, not finite or beyond MAX_COORDINATE, or there are not three in each row.
     """
     try:
         array = np.asarray(poses, dtype=np.float64)
@@ -29,8 +29,8 @@ def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
         array = array.reshape(0, 3)
     if array.ndim != 2 or array.shape[1] != 3:
         raise SettingError(f"poses have the shape {array.shape}; give rows of x, y, heading")
-    valid = (np.abs(array) <= FARTHEST).all(axis=1)  # False for nan
+    valid = (np.abs(array) <= MAX_COORDINATE).all(axis=1)  # False for nan
     if not valid.all():
         row = int(valid.argmin())
-        raise SettingError(f"pose {row} is {array[row].tolist()}; give finite numbers up to {FARTHEST:g}")
+        raise SettingError(f"pose {row} is {array[row].tolist()}; give finite numbers up to {MAX_COORDINATE:g}")
     return array

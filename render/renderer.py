@@ -36,7 +36,7 @@ class Renderer(Protocol):
             included. Alpha is the share of the pixel that something covers: 255 all of it, 0 open sky.
 
         Raises:
-            InputError: A pose is not finite or beyond FARTHEST, or the renderer is closed.
+            InputError: A pose is not finite or beyond MAX_COORDINATE, or the renderer is closed.
         """
         ...
 

@@ -3,29 +3,29 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError
 
 from .definition import BENCHMARKS
-from .results import ASKED, RESULTS, Result, read_result
+from .results import RESULTS, Result, read_result
 
 
 def read_results(folder: Path) -> list[Result]:
-    """All results in a folder, which may be one that tussock benchmark wrote, with the runs beside the results.
+    """All results in a folder; it may be the one that tussock benchmark wrote, with the runs next to the results.
 
-    Raises InputError where there are none, where a file is none, and for several versions.
+    Raises FileError where there are none, where a file is not a result, and for results that do not compare.
     """
     if (folder / RESULTS).is_dir():
         folder = folder / RESULTS
     results = [read_result(path) for path in sorted(folder.glob("*.json"))]
     if not results:
-        raise InputError(f"{folder} holds no results (*.json); give the folder that tussock benchmark wrote")
+        raise FileError(f"{folder} holds no results (*.json); give the folder that tussock benchmark wrote")
     names = sorted({result.benchmark for result in results})
     if len(names) > 1:
-        raise InputError(
+        raise FileError(
             f"{folder} holds results of {' and '.join(names)}, which do not compare; keep each in a folder of its own"
         )
-    if len({tuple(run[name] for run in result.runs for name in ASKED) for result in results}) > 1:
-        raise InputError(f"{folder} holds results of {names[0]} whose runs are not the same; make them again")
+    if len({tuple(run.asked for run in result.runs) for result in results}) > 1:
+        raise FileError(f"{folder} holds results of {names[0]} whose runs are not the same; make them again")
     return results
 
 
@@ -59,7 +59,7 @@ def _rank(scored: tuple[dict, Result]) -> tuple:
 
 
 def _name(result: Result) -> str:
-    """The entry, and what it saw where that is its own choice."""
+    """The entry, and its encoding where that is its own choice."""
     benchmark = BENCHMARKS.get(result.benchmark)
     usual = benchmark is not None and result.encoding == benchmark.chain()
     return _cell(f"`{result.entry}`" if usual else f"`{result.entry}`, `{result.encoding}`")

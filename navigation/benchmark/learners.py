@@ -10,42 +10,68 @@ from typing import Any
 
 import numpy as np
 
-from ..cli.run_options import RunOptions
-from ..rl.environment import RouteFollowing
-from .definition import BENCHMARK, ENCODING, Benchmark
-from .results import Line, Result, check_free, line_of, result_of, write_result
+from tussock.world.progress import Progress, no_progress
 
-PANORAMA = "panorama"  # the encoding of entries that see the view as it is
+from ..experiment import Experiment
+from ..rl.environment import RouteFollowing
+from ..sweeps.work import open_path
+from .definition import BENCHMARK, ENCODING, Benchmark
+from .results import PANORAMA, Line, Result, check_free, line_of, result_of, write_result
+
 Act = Callable[[np.ndarray, int], np.ndarray]  # observation, number of the look from 0 on -> action
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """A run for a learner: what the environment is made with, and what it is reset with.
+    """A run for a learner: `RouteFollowing(**settings)`, then `reset(**reset)`.
 
-    `RouteFollowing(**settings)`, then `reset(**reset)`. Tasks of one world and noise share one `settings`, and so can one environment.
+    Attributes:
+        run: The run.
+        settings: What the environment is made with; tasks of one world and noise share them, and so can one environment.
+        reset: What it is reset with.
     """
 
-    run: RunOptions
+    run: Experiment
     settings: dict[str, Any]
     reset: dict[str, Any]
 
 
 def tasks(benchmark: Benchmark = BENCHMARK, encoding: str | None = ENCODING) -> Iterator[Task]:
-    """All runs of the test bed, those of one world, and of one noise there, together. encoding: None leaves the panorama as it is."""
+    """All runs of the test bed, those of one world, and of one noise there, together.
+
+    Args:
+        benchmark: What is asked.
+        encoding: What the learner gets of a view; None is the panorama itself.
+    """
     for runs in benchmark.by_world(encoding or ENCODING):
         yield from _tasks_of(runs, encoded=encoding is not None)
 
 
 def enter_learner(
-    learn: Callable[[RouteFollowing], Act], name: str, out: Path, *, encoding: str | None = ENCODING,
-    benchmark: Benchmark = BENCHMARK, progress: Callable[[int, int], object] = lambda done, total: None,
-) -> tuple[Result, Path]:  # fmt: skip
-    """Enter a learner, under a name; returns the result and its file, in `out`/results.
+    learn: Callable[[RouteFollowing], Act],
+    name: str,
+    out: Path,
+    *,
+    encoding: str | None = ENCODING,
+    benchmark: Benchmark = BENCHMARK,
+    progress: Progress = no_progress,
+) -> tuple[Result, Path]:
+    """Enter a learner.
 
-    learn(env): called for each world with an environment there that is reset; what it may learn from is `env.training_views()`. It
-    returns act(observation, look), which gives the action after each look; look 0 is the first of a walk. Raises InputError as
-    `enter_named` does.
+    Args:
+        learn: Called for each world with an environment there that is reset; `env.training_views()` is what it may learn from. It
+            returns act(observation, look), which gives the action after each look; look 0 is the first of a walk.
+        name: Of the entry.
+        out: The result is written to `out`/results.
+        encoding: What the learner gets of a view; None is the panorama itself.
+        benchmark: What is asked.
+        progress: Called with how many runs are finished, of how many.
+
+    Returns:
+        The result and its file.
+
+    Raises:
+        InputError: As `enter_named` does.
     """
     lines: list[Line] = []
     learn_seconds, walk_seconds = [], []
@@ -73,32 +99,48 @@ def enter_learner(
 
 
 def walk(env: RouteFollowing, task: Task, act: Act) -> dict[str, Any]:
-    """Do a run; what was found, by name."""
+    """Do a run; its results, by name."""
     observation, info = env.reset(**task.reset)
     deviation = [info["deviation_m"]]
     while info["reason"] is None:
         observation, _, _, _, info = env.step(act(observation, len(deviation) - 1))
         deviation.append(info["deviation_m"])
     return {
-        "arrived": info["is_success"], "reason": info["reason"], "steps": len(deviation) - 1,
-        "mean_deviation_m": float(np.mean(deviation)), "max_deviation_m": max(deviation),
-    }  # fmt: skip
+        "arrived": info["is_success"],
+        "reason": info["reason"],
+        "steps": len(deviation) - 1,
+        "mean_deviation_m": float(np.mean(deviation)),
+        "max_deviation_m": max(deviation),
+    }
 
 
-def _tasks_of(runs: list[RunOptions], *, encoded: bool) -> list[Task]:
-    """The tasks of the runs in one world. Those of one noise have one `settings`."""
-    world, route = runs[0].open_route()
-    made: dict[float, dict[str, Any]] = {}
+def _tasks_of(runs: list[Experiment], *, encoded: bool) -> list[Task]:
+    """The tasks of the runs in one world. Those of one noise share their settings."""
+    world, route = open_path(runs[0])
+    shared: dict[float, dict[str, Any]] = {}
     for run in runs:
-        agent = run.agent_settings()
-        made.setdefault(run.heading_noise_deg, {
-            "world": world, "route": route, "eye": run.eye(), "renderer": run.renderer,
-            "encoding": run.chosen_encoding() if encoded else None, "offset": max(abs(each.offset_m) for each in runs),
-            "heading_noise": agent.heading_noise, "step_length": agent.step_length, "arrive": agent.arrive, "lost": agent.lost,
-            "patience": agent.patience, "max_steps": agent.max_steps,
-        })  # fmt: skip
-    starts = [tuple(route.start.moved(0.0, run.offset_m)) for run in runs]
+        shared.setdefault(
+            run.body.heading_noise,
+            {
+                "world": world,
+                "route": route,
+                "eye": run.eye,
+                "renderer": run.renderer,
+                "encoding": run.encoding if encoded else None,
+                "offset": max(abs(each.start_offset) for each in runs),
+                "heading_noise": run.body.heading_noise,
+                "step_length": run.body.step_length,
+                "arrive": run.stopping.arrival_radius,
+                "lost": run.stopping.max_deviation,
+                "patience": run.stopping.patience,
+                "max_steps": run.stopping.max_steps,
+            },
+        )
     return [
-        Task(run=run, settings=made[run.heading_noise_deg], reset={"seed": run.seed, "options": {"start": start}})
-        for run, start in zip(runs, starts, strict=True)
+        Task(
+            run=run,
+            settings=shared[run.body.heading_noise],
+            reset={"seed": run.seed, "options": {"start": tuple(run.start(route))}},
+        )
+        for run in runs
     ]

@@ -1,153 +1,201 @@
-"""What came of an entry: a line a run, the numbers that follow from them, and its file."""
+"""The result of an entry: a line for each run, the numbers that follow from these, and its file."""
 
 import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from tussock.world.atomic import replacing
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, InputError, SettingError
+from tussock.world.settings import number, settings, switch, text, whole
 
-from ..cli.run_options import RunOptions
-from ..stopping import NUMBER
+from ..encoding import Encoding
+from ..experiment import Experiment
+from ..experiment_settings import settings_of
 from ..sweeps.statistics import mean_interval
 from .definition import BENCHMARKS, Benchmark
 
-Kinds = Mapping[str, Any]  # what values may be, by their names
-HEAD: Kinds = {
-    "benchmark": str, "entry": str, "encoding": str, "tussock": str, "runs": list, "memory_bytes": int | None, "times": dict,
-}  # fmt: skip
-# Of a run: what was asked, which tells the runs of an entry apart, and what was found.
-ASKED: Kinds = {"world": str, "seed": int, "heading_noise_deg": NUMBER, "offset_m": NUMBER}
-FOUND: Kinds = {
-    "arrived": bool, "reason": str | None, "steps": int | None, "mean_deviation_m": NUMBER | None,
-    "max_deviation_m": NUMBER | None, "poor_steps": int | None, "cause": str | None, "error": str | None,
-}  # fmt: skip
+PANORAMA = "panorama"  # the encoding of entries that get the view as it is
 TIMES = ("learn_seconds", "walk_seconds")
-RESULTS = "results"  # the folder of the results, beside the runs, which are a sweep's with files of its own
-LARGEST = 2**63  # numbers of a result are smaller
+RESULTS = "results"  # the folder of the results, next to the runs, which are a sweep's with files of its own
+LIMIT = 2**63  # numbers of a result are smaller
+ASKED = ("world", "seed", "heading_noise_deg", "offset_m")  # of a line: what tells the runs of an entry apart
 
-Line = dict[str, Any]  # of a run: ASKED and FOUND by name; None for what is not known
 
+@settings
+class Line:
+    """A run: what was asked, and its results; None for what is not known.
 
-@dataclass(frozen=True, kw_only=True)
-class Result:
-    """What came of an entry.
-
-    entry: its name; for a model of this project its spelling. encoding: of what it saw. runs: a line each. memory_bytes: the most that it
-    had learned in a world, None where that is not known. tussock: the version that walked. times: the means of TIMES, which no two
-    results have alike.
+    Attributes:
+        world: Preset of the world.
+        seed: Of the world, the route, the model and the noise.
+        heading_noise_deg: Of the noise on every turn (standard deviation, degrees).
+        offset_m: Displacement of the start (m, to the left).
+        arrived: Whether the agent arrived; one that could not run did not.
+        reason: Why the walk ended.
+        steps: Number of steps.
+        mean_deviation_m: Mean distance from the route (m).
+        max_deviation_m: Greatest distance from the route (m).
+        poor_steps: Number of poor steps.
+        cause: Why it failed.
+        error: Why the run could not be done.
     """
 
-    benchmark: str
-    entry: str
-    encoding: str
-    tussock: str
-    runs: Sequence[Line]
-    memory_bytes: int | None
-    times: Mapping[str, float]
+    world: str = text()
+    seed: int = whole(low=0)
+    heading_noise_deg: float = number(low=-LIMIT, high=LIMIT)
+    offset_m: float = number(low=-LIMIT, high=LIMIT)
+    arrived: bool = switch(False)
+    reason: str | None = text(None, optional=True)
+    steps: int | None = whole(None, low=0, optional=True)
+    mean_deviation_m: float | None = number(None, low=-LIMIT, high=LIMIT, optional=True)
+    max_deviation_m: float | None = number(None, low=-LIMIT, high=LIMIT, optional=True)
+    poor_steps: int | None = whole(None, low=0, optional=True)
+    cause: str | None = text(None, optional=True)
+    error: str | None = text(None, optional=True)
+
+    @property
+    def asked(self) -> tuple:
+        """What was asked, in the order of ASKED."""
+        return tuple(getattr(self, name) for name in ASKED)
+
+
+@settings
+class Result:
+    """The result of an entry.
+
+    Attributes:
+        benchmark: Name of what was asked.
+        entry: Its name; for a model with a name its spec.
+        encoding: Of the views that it got.
+        tussock: The version that walked.
+        runs: A line for each.
+        memory_bytes: The most that it had learned in a world; None where that is not known.
+        times: The means of TIMES, which differ from result to result.
+    """
+
+    benchmark: str = text()
+    entry: str = text()
+    encoding: str = text()
+    tussock: str = text()
+    runs: Sequence[Line] = attrs.field()
+    memory_bytes: int | None = whole(None, low=0, optional=True)
+    times: Mapping[str, float] = attrs.field()
 
     def scores(self) -> dict[str, Any]:
         """The numbers of all runs, and of those of each displacement, noise and preset."""
         totals = score(self.runs)
         totals["arrived_share_95"] = interval_over_worlds(self.runs)
-        failed = [run for run in self.runs if not run["arrived"]]
-        poor = [run["poor_steps"] for run in self.runs if run["poor_steps"] is not None]
+        failed = [run for run in self.runs if not run.arrived]
+        poor = [run.poor_steps for run in self.runs if run.poor_steps is not None]
         totals |= {
-            "reasons": _counted(run["reason"] for run in failed), "causes": _counted(run["cause"] for run in failed),
-            "could_not_run": sum(run["error"] is not None for run in self.runs), "poor_steps": sum(poor) if poor else None,
-        }  # fmt: skip
+            "reasons": _counts(run.reason for run in failed),
+            "causes": _counts(run.cause for run in failed),
+            "could_not_run": sum(run.error is not None for run in self.runs),
+            "poor_steps": sum(poor) if poor else None,
+        }
         parts = {"by_displacement_m": "offset_m", "by_noise_deg": "heading_noise_deg", "by_preset": "world"}
         return {"totals": totals} | {name: self._by(key) for name, key in parts.items()}
 
     def _by(self, key: str) -> dict[str, Any]:
-        values = dict.fromkeys(run[key] for run in self.runs)
+        values = dict.fromkeys(getattr(run, key) for run in self.runs)
         return {
-            value if isinstance(value, str) else f"{value:g}": score([run for run in self.runs if run[key] == value])
+            value if isinstance(value, str) else f"{value:g}": score(
+                [run for run in self.runs if getattr(run, key) == value]
+            )
             for value in values
         }
 
     def to_json(self) -> str:
-        """As its file has it: a line a run, at the end."""
-        said = {"benchmark": self.benchmark, "entry": self.entry, "encoding": self.encoding, "tussock": self.tussock}
-        said |= self.scores() | {"memory_bytes": self.memory_bytes, "times": dict(self.times)}
-        lines = ",\n".join(f"  {json.dumps(run)}" for run in self.runs)
-        return f'{json.dumps(said, indent=1)[:-2]},\n "runs": [\n{lines}\n ]\n}}\n'
+        """The text of its file: the runs at the end, one in each line."""
+        head = {name: getattr(self, name) for name in ("benchmark", "entry", "encoding", "tussock")}
+        head |= self.scores() | {"memory_bytes": self.memory_bytes, "times": dict(self.times)}
+        lines = ",\n".join(f"  {json.dumps(attrs.asdict(run))}" for run in self.runs)
+        return f'{json.dumps(head, indent=1)[:-2]},\n "runs": [\n{lines}\n ]\n}}\n'
 
 
 def score(runs: Sequence[Line]) -> dict[str, Any]:
-    """How many runs there are and how many arrive, and how far off the route those are on average (m; None where none arrives)."""
-    arrived = [run for run in runs if run["arrived"]]
-    deviation = float(np.mean([run["mean_deviation_m"] for run in arrived])) if arrived else None
+    """How many runs there are, how many arrive, and the mean deviation of those (m; None where none arrives)."""
+    deviations = [run.mean_deviation_m or 0.0 for run in runs if run.arrived]
     return {
         "runs": len(runs),
-        "arrived": len(arrived),
-        "arrived_share": len(arrived) / len(runs),
-        "mean_deviation_m": deviation,
+        "arrived": len(deviations),
+        "arrived_share": len(deviations) / len(runs),
+        "mean_deviation_m": float(np.mean(deviations)) if deviations else None,
     }
 
 
 def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
-    """Between which shares of arrivals 95 of 100 sets of as many worlds would lie, drawn with replacement from these."""
-    worlds = {world: number for number, world in enumerate(dict.fromkeys((run["world"], run["seed"]) for run in runs))}
-    groups = np.array([worlds[run["world"], run["seed"]] for run in runs])
-    found = mean_interval(np.array([float(run["arrived"]) for run in runs]), groups)
-    return [round(found.low, 9), round(found.high, 9)]
+    """The 95 % interval of the share that arrives, over sets of as many worlds drawn with replacement from these."""
+    worlds = {world: k for k, world in enumerate(dict.fromkeys((run.world, run.seed) for run in runs))}
+    groups = np.array([worlds[run.world, run.seed] for run in runs])
+    interval = mean_interval(np.array([float(run.arrived) for run in runs]), groups)
+    return [round(interval.low, 9), round(interval.high, 9)]
 
 
-def line_of(run: RunOptions, found: Mapping[str, Any]) -> Line:
-    """The line of a run, of what was found by name. Who could not run has not arrived."""
-    line = {name: getattr(run, name) for name in ASKED} | {name: found.get(name) for name in FOUND}
-    return line | {"arrived": bool(found.get("arrived"))}
+def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
+    """The line of a run, from its results by name."""
+    settings = settings_of(experiment)
+    values: dict[str, Any] = {name: settings[name] for name in ASKED}
+    values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in ASKED}
+    values["arrived"] = bool(values["arrived"])
+    return Line(**values)
 
 
 def result_of(
-    benchmark: Benchmark, entry: str, encoding: str, runs: Sequence[Line], *, memory_bytes: Sequence[int | None],
-    learn_seconds: Sequence[float], walk_seconds: Sequence[float],
-) -> Result:  # fmt: skip
-    """What came of an entry, from what came of its runs."""
+    benchmark: Benchmark,
+    entry: str,
+    encoding: str,
+    runs: Sequence[Line],
+    *,
+    memory_bytes: Sequence[int | None],
+    learn_seconds: Sequence[float],
+    walk_seconds: Sequence[float],
+) -> Result:
+    """The result of an entry, from its runs."""
     known = [size for size in memory_bytes if size is not None]
-    times = {
-        name: float(np.mean(given))
-        for name, given in zip(TIMES, (learn_seconds, walk_seconds), strict=True)
-        if len(given)
-    }
+    times = zip(TIMES, (learn_seconds, walk_seconds), strict=True)
     return Result(
-        benchmark=benchmark.name, entry=entry, encoding=encoding, tussock=version("tussock"), runs=runs,
-        memory_bytes=max(known, default=None), times=times,
-    )  # fmt: skip
+        benchmark=benchmark.name,
+        entry=entry,
+        encoding=encoding,
+        tussock=version("tussock"),
+        runs=runs,
+        memory_bytes=max(known, default=None),
+        times={name: float(np.mean(seconds)) for name, seconds in times if len(seconds)},
+    )
 
 
 def file_of(out: Path, benchmark: Benchmark, entry: str, encoding: str) -> Path:
-    """Where the result of an entry is kept. Raises InputError for a name of which no file can be named."""
+    """Where the result of an entry is kept. Raises SettingError for a name from which no file name follows."""
     words = [entry] if encoding == benchmark.chain() else [entry, encoding]
     parts = [re.sub(r"[^a-z0-9.]+", "-", word.lower()).strip("-.") for word in words]
     if not (all(parts) and entry.isprintable()):
-        raise InputError(f"entry {entry!r}: give a name of one line with letters in it")
+        raise SettingError(f"entry {entry!r}: give a name of one line with letters in it")
     return out / RESULTS / f"{'-'.join(parts)}.json"
 
 
 def check_free(out: Path, benchmark: Benchmark, entry: str, encoding: str) -> Path:
-    """Where a result may be written: nowhere yet, or over one of the same entry. Makes the folder.
+    """Where a result may be written: to a new file, or over one of the same entry. Makes the folder.
 
-    Raises InputError for another's, and where there are results that this one would not compare with.
+    Raises InputError for another entry's file, and where there are results that this one would not compare with.
     """
     path = file_of(out, benchmark, entry, encoding)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path.parent} cannot be written ({error.strerror}); give another --out") from error
+        raise FileError(f"{path.parent} cannot be written ({error.strerror}); give another --out") from error
     for other in sorted(path.parent.glob("*.json")):
         there = read_result(other)
         mine = (there.entry, there.encoding) == (entry, encoding)
         if there.benchmark != benchmark.name or (other == path and not mine):
-            raise InputError(
+            raise FileError(
                 f"{other} holds a result of {there.benchmark} ({there.entry}, {there.encoding}), and this would be one of "
                 f"{benchmark.name} ({entry}, {encoding}); give another --out"
             )
@@ -163,45 +211,43 @@ def write_result(result: Result, out: Path, benchmark: Benchmark) -> Path:
 
 
 def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Result:
-    """Read a result. Raises InputError for what is none, and for one whose runs are not those of its benchmark, where it is known."""
+    """Read a result. Raises FileError for an invalid one, and where its runs are not those of its benchmark, if that is known."""
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        _check_kinds(said, HEAD)
-        _check_kinds(said["times"], dict.fromkeys(said["times"], NUMBER))
-        for run in said["runs"]:
-            _check_kinds(run, {**ASKED, **FOUND})
-        if not said["runs"]:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        lines = [Line(**{each.name: run[each.name] for each in attrs.fields(Line)}) for run in content["runs"]]
+        if not lines:
             raise ValueError("no runs")
-        result = Result(**{name: said[name] for name in Result.__dataclass_fields__})
+        times = {name: float(seconds) for name, seconds in content["times"].items()}
+        rest: dict[str, Any] = {
+            name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")
+        }
+        rest["encoding"] = current_encoding(rest["encoding"])
+        result = Result(**rest, runs=lines, times=times)
         scores = json.loads(json.dumps(result.scores()))
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path} is no result of tussock benchmark ({error!r}); make it again") from error
-    if any(scores[name] != said.get(name) for name in scores):
-        raise InputError(f"{path}: its totals do not follow from its runs; make it again")
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError) as error:
+        raise FileError(f"{path} is not a result of tussock benchmark ({error!r}); make it again") from error
+    if any(scores[name] != content.get(name) for name in scores):
+        raise FileError(f"{path}: its totals do not follow from its runs; make it again")
     if (benchmark := known.get(result.benchmark)) is not None:
         _check_runs(path, result, benchmark)
     return result
 
 
-def _check_kinds(values: Mapping[str, Any], kinds: Kinds) -> None:
-    """Raises ValueError where a value is not of its kind, LookupError where it is not there."""
-    for name, kind in kinds.items():
-        value = values[name]
-        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-            raise ValueError(f"{name} is {value!r}")
-        if isinstance(value, NUMBER) and not abs(value) < LARGEST:  # nor is nan
-            raise ValueError(f"{name} is {value}" if isinstance(value, float) else f"{name} is too large")
-        if isinstance(value, str) and kind is str and not value.isprintable():
-            raise ValueError(f"{name} {value!r} cannot be printed")
+def current_encoding(encoding: str) -> str:
+    """An encoding with the names that its steps have today."""
+    try:
+        return encoding if encoding == PANORAMA else str(Encoding.parse(encoding, importing=False))
+    except InputError:  # with a step that is not known here
+        return encoding
 
 
 def _check_runs(path: Path, result: Result, benchmark: Benchmark) -> None:
-    asked = [tuple(getattr(run, name) for name in ASKED) for runs in benchmark.by_world() for run in runs]
-    if [tuple(run[name] for name in ASKED) for run in result.runs] != asked:
-        raise InputError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
+    asked = [tuple(settings_of(run)[name] for name in ASKED) for runs in benchmark.by_world() for run in runs]
+    if [run.asked for run in result.runs] != asked:
+        raise FileError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
 
 
-def _counted(values: Iterable[str | None]) -> dict[str, int]:
-    """How often each value occurs, None left out, the commonest first."""
+def _counts(values: Iterable[str | None]) -> dict[str, int]:
+    """How often each value occurs, None left out, the most frequent first."""
     counts = Counter(value for value in values if value is not None)
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))

@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 
 from .sweeps import check_workers
-from .terminal import progress, say
+from .terminal import message, progress
 
 
 @dataclass
@@ -19,9 +19,9 @@ class BenchmarkCommand:
     model: str | None = None
     """all, or names separated by commas (see tussock models), after which their parameters may follow."""
     out: Path = Path("benchmark")
-    """Folder for the runs and, in its folder results, what comes of them; runs that are finished there are not done again."""
+    """Folder for the runs and, in its folder results, for the results; runs that are finished there are not done again."""
     encoding: str = "edges"
-    """What the models see of a view: edges, grey or sky, or a chain of steps. The eye is the test bed's."""
+    """What the models get of a view: edges, grey or sky, or a chain of steps. The eye is the test bed's."""
     quick: bool = False
     """A first look: other, fewer runs, whose results compare with no others."""
     leaderboard: Path | None = None
@@ -37,7 +37,9 @@ class BenchmarkCommand:
         from ..benchmark.leaderboard import leaderboard, read_results
 
         if (self.model is None) == (self.leaderboard is None):
-            raise InputError("give --model NAME to enter a model, or --leaderboard DIR to see the results in a folder")
+            raise SettingError(
+                "give --model NAME to enter a model, or --leaderboard DIR to see the results in a folder"
+            )
         check_workers(self.scheduler, self.workers)
         if self.leaderboard is not None:
             return {"table": leaderboard(read_results(self.leaderboard))}
@@ -56,14 +58,14 @@ class BenchmarkCommand:
         names = list(MODELS) if self.model == "all" else split_list(self.model or "")
         files = []
         for name in dict.fromkeys(map(checked_entry, names)):  # refuses what is none before the work begins
-            say(f"{name}: {len(benchmark)} runs of {benchmark.name}")
-            with progress("walking", "runs", aloud=True) as report:
+            message(f"{name}: {len(benchmark)} runs of {benchmark.name}")
+            with progress("walking", "runs", verbose=True) as report:
                 result, path = enter_named(
                     name, self.out, encoding=self.encoding, benchmark=benchmark, scheduler=self.scheduler,
                     workers=self.workers, progress=report,
                 )  # fmt: skip
-            errors = [run["error"] for run in result.runs if run["error"] is not None]
+            errors = [run.error for run in result.runs if run.error is not None]
             if errors:
-                say(f"{name}: {len(errors)} of {len(benchmark)} runs could not be done; the first: {errors[0]}")
+                message(f"{name}: {len(errors)} of {len(benchmark)} runs could not be done; the first: {errors[0]}")
             files.append(path)
         return files

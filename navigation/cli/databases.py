@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.world.errors import InputError, SettingError
 
-from .options import ROUTE_SPACING, PathOptions, SightOptions
-from .terminal import progress, say
+from ..training_setup import ROUTE_SPACING
+from .options import PathOptions, ViewOptions, open_renderer
+from .terminal import message, progress
 from .worlds import numbers
 
 if TYPE_CHECKING:
@@ -20,17 +21,17 @@ if TYPE_CHECKING:
     from tussock.world.geometry import Bounds
     from tussock.world.scene import World
 
-FINEST = 0.001  # m
+MIN_SPACING = 0.001  # m
 
 
 @dataclass(kw_only=True)
-class DatabaseGridCommand(SightOptions):
-    """Draw the views at all places of a grid, facing east, as an image database in the BoB format."""
+class DatabaseGridCommand(ViewOptions):
+    """Draw the views at all positions of a grid, facing east, as an image database in the BoB format."""
 
     out: Path
     """Folder to write; one that was interrupted is completed."""
     spacing_m: float = 0.2
-    """Places are the multiples of this in x and y .."""
+    """Positions are the multiples of this in x and y .."""
     from_m: Annotated[str | None, tyro.conf.arg(metavar="X,Y")] = None
     """.. from here .. Default: 0,0, or the world's corner where that lies farther inside."""
     to_m: Annotated[str | None, tyro.conf.arg(metavar="X,Y")] = None
@@ -39,13 +40,15 @@ class DatabaseGridCommand(SightOptions):
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        if not (math.isfinite(self.spacing_m) and self.spacing_m >= FINEST):
-            raise InputError(f"--spacing-m {self.spacing_m:g}: give at least {FINEST:g}; names hold whole millimetres")
+        if not (math.isfinite(self.spacing_m) and self.spacing_m >= MIN_SPACING):
+            raise SettingError(
+                f"--spacing-m {self.spacing_m:g}: give at least {MIN_SPACING:g}; names hold whole millimetres"
+            )
         low, high = (
             None if text is None else numbers(text, flag, "X,Y", "0,0")
             for text, flag in ((self.from_m, "--from-m"), (self.to_m, "--to-m"))
         )
-        world = self.open_world()
+        world = self.surroundings().open_world()
         return write(self, world, self.grid(world.field, low, high), self.out)
 
     def grid(self, field: "Bounds", low: tuple[float, ...] | None, high: tuple[float, ...] | None) -> "Grid":
@@ -55,7 +58,7 @@ class DatabaseGridCommand(SightOptions):
 
         for flag, corner in (("--from-m", low), ("--to-m", high)):
             if corner is not None and not field.contains(*corner):
-                raise InputError(f"{flag} {corner[0]:g},{corner[1]:g}: that is outside the world ({field})")
+                raise SettingError(f"{flag} {corner[0]:g},{corner[1]:g}: that is outside the world ({field})")
         usual = published_grid_area(field)
         return Grid.over(Bounds(*(low or usual[:2]), *(high or usual[2:])), self.spacing_m)
 
@@ -72,7 +75,9 @@ class DatabaseRouteCommand(PathOptions):
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        world, route = self.open_route()
+        surroundings = self.surroundings()
+        world = surroundings.open_world()
+        route = surroundings.open_route(world)
         return write(self, world, route.resampled(self.spacing_m).poses, self.out)
 
 
@@ -103,13 +108,13 @@ class DatabaseCheckCommand:
         }  # fmt: skip
 
 
-def write(sight: SightOptions, world: "World", poses: "Poses | Grid", out: Path) -> dict[str, Any]:
+def write(options: ViewOptions, world: "World", poses: "Poses | Grid", out: Path) -> dict[str, Any]:
     """Draw a database, showing progress."""
     from tussock.render.images.writing import write_database
 
     began = time.perf_counter()
-    with sight.open_renderer(world) as renderer:
-        say(f"renderer: {renderer.backend}")
+    with open_renderer(options.surroundings(), world) as renderer:
+        message(f"renderer: {renderer.backend}")
         with progress("drawing", "views") as report:
             database, rendered = write_database(out, renderer, poses, report)
     return {

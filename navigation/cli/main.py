@@ -1,6 +1,7 @@
-"""The command line: hands flags to the commands, and says what came of it."""
+"""The command line: gives flags to the commands, and prints their results."""
 
 import json
+import logging
 import os
 import signal
 import sys
@@ -19,7 +20,7 @@ from .models import CompareCommand, EvaluateCommand, ModelsCommand, PlayCommand,
 from .protocols import REPLICATIONS
 from .studies import StudyCommand, ThesisCommand
 from .sweeps import ReportCommand, SweepCommand
-from .terminal import say, show
+from .terminal import MessageHandler, message, show
 from .worlds import RouteCommand, ViewCommand, WorldCommand
 
 # A command by its name, or a sentence and the commands that go under one name.
@@ -56,8 +57,10 @@ def main(arguments: list[str] | None = None) -> None:
     command = tyro.cli(
         choice_of(COMMANDS), prog="tussock", args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-        description="Insect visual route navigation: grow a world, look around in it, learn a route, walk it home.",
+        description="Insect visual route navigation: make a world, look around in it, learn a route, walk it home.",
     )  # fmt: skip
+    log = logging.getLogger("tussock")
+    log.handlers, log.level, log.propagate = [MessageHandler()], logging.INFO, False
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
     try:
         if command.json:
@@ -80,7 +83,7 @@ def main(arguments: list[str] | None = None) -> None:
     except MemoryError as error:
         fail(f"not enough memory ({error}); take a smaller --size, or fewer views")
     except KeyboardInterrupt:
-        say("tussock: interrupted")
+        message("tussock: interrupted")
         sys.exit(130)
 
 
@@ -117,9 +120,9 @@ def standard_output_as_error() -> Iterator[None]:
         os.close(output)
 
 
-def fail(message: str) -> None:
-    """Say what was wrong in one line and exit with code 2."""
-    say(f"tussock: {' '.join(message.split())}")
+def fail(error: str) -> None:
+    """Print what was wrong in one line and exit with code 2."""
+    message(f"tussock: {' '.join(error.split())}")
     sys.exit(2)
 
 

@@ -1,30 +1,25 @@
-"""The commands that learn routes and walk them: a dataclass with a field a flag. Heavy packages are imported where they are used."""
+"""The commands that train, test and run models. Heavy packages are imported where they are used."""
 
 import dataclasses
 import math
-import shlex
+import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, SettingError
 
-from .options import RouteOptions, words_of
-from .run_options import FILE_SUFFIX, LearningOptions, Lesson, RunOptions
-from .terminal import progress, say
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from tussock.render.renderer import Renderer
+from ..experiment import MODEL_SUFFIX
+from .options import LearningOptions, ModelOptions, RunOptions, open_renderer
+from .terminal import message, progress, progress_of_parts
 
 
 @dataclass
-class EvaluateCommand(LearningOptions):
-    """Learn a route, then recover the heading at every grid position beside it."""
+class EvaluateCommand(ModelOptions):
+    """Learn a route, then recover the heading at every grid position near it."""
 
     grid_m: float = 0.2
     """Positions are the multiples of this in x and y .."""
@@ -36,90 +31,110 @@ class EvaluateCommand(LearningOptions):
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        import time
-
         from ..evaluation import grid_positions, heading_errors
 
         began = time.perf_counter()
         if not 0 < self.scan_deg <= 360:
-            raise InputError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
-        lesson = self.prepare()
-        positions = grid_positions(lesson.route, grid=self.grid_m, within=self.within_m, field=lesson.world.field)
-        with self.open_renderer(lesson.world) as renderer:
-            learned = taught(lesson, renderer)
+            raise SettingError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
+        experiment = self.experiment()
+        world = experiment.open_world()
+        route = experiment.open_route(world)
+        positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
+        with open_renderer(experiment, world) as renderer:
+            message(f"renderer: {renderer.backend}")
+            with progress("learning", "views") as report:
+                trained = experiment.train(renderer, route, report)
+            assert trained.model is not None
+            views = route.resampled(experiment.training.spacing)
             with progress("recovering headings", "positions") as report:
-                found = heading_errors(
-                    lesson.model, lesson.encoding, renderer, lesson.route_views, positions,
-                    scan=math.radians(self.scan_deg), progress=report,
-                )  # fmt: skip
+                errors = heading_errors(
+                    trained.model.model,
+                    experiment.encoding,
+                    renderer,
+                    views,
+                    positions,
+                    scan=math.radians(self.scan_deg),
+                    progress=report,
+                )
         return {
-            "model": str(lesson.model), "encoding": str(lesson.encoding),
-            "n_views": None if learned is None else len(learned), "n_positions": len(positions),
-            "median_error_deg": found.median_error_deg, "mean_error_deg": found.mean_error_deg,
-            "share_over_45": found.share_over_45, "seconds": time.perf_counter() - began,
-        }  # fmt: skip
+            "model": str(trained.model.model),
+            "encoding": str(experiment.encoding),
+            "n_views": None if trained.poses is None else len(trained.poses),
+            "n_positions": len(positions),
+            "median_error_deg": errors.median_error_deg,
+            "mean_error_deg": errors.mean_error_deg,
+            "share_over_45": errors.share_over_45,
+            "seconds": time.perf_counter() - began,
+        }
+
+    def settings(self) -> dict[str, Any]:
+        """As for all; the scan is of the evaluation, not of a navigator."""
+        return {name: value for name, value in super().settings().items() if name != "scan_deg"}
 
 
 @dataclass
-class TrainCommand(LearningOptions):
+class TrainCommand(ModelOptions):
     """Learn a route and keep the model in a file, for evaluate and run."""
 
     out: Path = Path("model.safetensors")
     """File to write."""
-    learning_walk_m: float = 0.2
+    learning_walk_m: float = RunOptions.learning_walk_m
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
     json: bool = False
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        import time
-
         import numpy as np
 
         from tussock.world.atomic import check_writable
 
-        from ..models.base import IncrementalModel, Model
-        from ..models.files import save_model
+        from ..models.base import IncrementalModel, memory_bytes
+        from ..models.files import TrainedModel, load_model, save_model
+        from ..threads import threads
         from ..training import training_views
 
-        if self.out.suffix != FILE_SUFFIX:
-            raise InputError(f"{self.out}: a model is written as {FILE_SUFFIX}")
+        if self.out.suffix != MODEL_SUFFIX:
+            raise FileError(f"{self.out}: a model is written as {MODEL_SUFFIX}")
         check_writable(self.out)
-        lesson = self.prepare()
-        model, saved = lesson.model, lesson.saved
-        assert isinstance(model, Model)
-        if saved is None:
-            learn = model.fit
-        elif isinstance(model, IncrementalModel):
-            learn = model.partial_fit
-        else:
-            raise InputError(
-                f"{self.model}: {model.name} learns all its views at once and cannot go on; give --model '{model}'"
+        experiment = self.experiment()
+        before = load_model(experiment.model) if isinstance(experiment.model, Path) else None
+        model = experiment.make_model() if before is None else before.model
+        if before is not None and not isinstance(model, IncrementalModel):
+            raise SettingError(
+                f"{self.model}: {model} learns all its views at once and cannot go on; give --model '{model}'"
             )
-        with self.open_renderer(lesson.world) as renderer:
-            with progress("looking", "views") as report:
-                views, poses = training_views(lesson.encoding, renderer, lesson.poses, report)
-            say(f"learning {len(views)} views")
-            began = time.perf_counter()
-            learn(views)
-            if saved is not None:
-                poses = None if saved.poses is None else np.concatenate([saved.poses, poses])
-            seconds = time.perf_counter() - began
-            save_model(model, self.out, encoding=lesson.encoding, eye=renderer.eye, poses=poses)
+        world = experiment.open_world()
+        route = experiment.open_route(world)
+        with open_renderer(experiment, world) as renderer, progress("drawing", "views") as report:
+            wanted = experiment.training_poses(world, route)
+            views, poses = training_views(experiment.encoding, renderer, wanted, report)
+        message(f"learning {len(views)} views")
+        began = time.perf_counter()
+        with threads(experiment.threads):
+            (model.partial_fit if isinstance(model, IncrementalModel) and before is not None else model.fit)(views)
+        seconds = time.perf_counter() - began
+        if before is not None:
+            poses = None if before.poses is None else np.concatenate([before.poses, poses])
+        trained = TrainedModel(model=model, encoding=experiment.encoding, eye=experiment.eye, poses=poses)
+        save_model(trained, self.out)
         return {
-            "file": str(self.out), "model": str(model), "encoding": str(lesson.encoding), "n_views": len(views),
-            "memory_bytes": model.memory_bytes, "fit_seconds": seconds,
-        }  # fmt: skip
+            "file": str(self.out),
+            "model": str(model),
+            "encoding": str(experiment.encoding),
+            "n_views": len(views),
+            "memory_bytes": memory_bytes(model),
+            "fit_seconds": seconds,
+        }
 
 
 @dataclass
-class CompareCommand(RouteOptions):
-    """Train and test models side by side: headings recovered beside the route, and a walk home."""
+class CompareCommand(LearningOptions):
+    """Train and test models side by side: headings recovered near the route, and a walk home."""
 
     models: str = "all"
     """all, or names separated by commas (see tussock models). Parameters may follow a name, as in 'infomax rate=baddeley,chain';
-    commas inside parentheses separate no names: 'mlp hidden_layer_sizes=(100,50),chain'."""
-    learning_walk_m: float = 0.2
+    commas inside parentheses separate no names: 'mlp hidden_layer_sizes=(100,50),chain'. A model of your own is package.module:Class."""
+    learning_walk_m: float = RunOptions.learning_walk_m
     """Reach of the learning walk before the walk home. Headings are recovered from views on the route alone."""
     grid_m: float = 0.2
     """Headings are recovered at the multiples of this in x and y .."""
@@ -135,33 +150,28 @@ class CompareCommand(RouteOptions):
 
         from ..comparison import compare_models
         from ..evaluation import grid_positions
-        from ..models import MODELS, make_model
-        from ..models.base import check_device
-        from ..training import training_poses
+        from ..models import MODELS, model_spec
 
-        check_device(self.device)
+        experiment = self.experiment()
         names = list(MODELS) if self.models == "all" else split_list(self.models)
-        names = list(dict.fromkeys(names))
-        for name in names:
-            make_model(name)  # refuses what is none before the work begins
-        encoding = self.chosen_encoding()
-        world, route = self.open_route()
-        views = route.resampled(self.spacing_m)
+        specs = {name: model_spec(name) for name in dict.fromkeys(names)}
+        for spec in specs.values():
+            experiment.replace(model=spec)  # refuses bad parameters before the work begins
+        world = experiment.open_world()
+        route = experiment.open_route(world)
         positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
         rows = {}
-        with self.open_renderer(world) as renderer, progress("comparing", "models") as report:
-            compared = compare_models(
-                [partial(make_model, name, seed=self.seed, device=self.device) for name in names],
-                encoding=encoding, renderer=renderer, route=route, route_views=views, positions=positions,
-                every=self.every, learning_walk=self.learning_walk_m, offset=self.offset_m, seed=self.seed,
-            )  # fmt: skip
-            report(0, len(names))
-            for name, row in zip(names, compared, strict=True):
+        with open_renderer(experiment, world) as renderer, progress("comparing", "models") as report:
+            report(0, len(specs))
+            for name, row in zip(
+                specs, compare_models(specs.values(), experiment, renderer, route, positions), strict=True
+            ):
                 rows[name] = dataclasses.asdict(row)
-                report(len(rows), len(names))
+                report(len(rows), len(specs))
+        on_route = experiment.replace(training__learning_walk=0.0)
         return {
-            "encoding": str(encoding),
-            "n_views": len(training_poses(views, every=self.every)),
+            "encoding": str(experiment.encoding),
+            "n_views": len(on_route.training_poses(world, route)),
             "n_positions": len(positions),
             "models": rows,
         }
@@ -179,7 +189,11 @@ class ModelsCommand:
         from ..models.opponents import Opponent
 
         classes = {name: model_class(name) for name in MODELS} | {f"{OPPONENT}...": Opponent}
-        return {"models": {name: {"what": summary(cls), "paper": cls.paper} for name, cls in classes.items()}}
+        return {
+            "models": {
+                name: {"what": summary(cls), "paper": getattr(cls, "paper", "")} for name, cls in classes.items()
+            }
+        }
 
 
 @dataclass
@@ -198,28 +212,21 @@ class RunCommand(RunOptions):
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        from ..recording.run_folder import check_run_folder, record_walk
+        from ..recording.run_folder import check_run_folder, record_run
 
         viewer = self.viewer if self.live else None
-        inputs = [Path(name) for name in (self.world, self.route) if name is not None]
-        check_run_folder(self.out, overwrite=self.overwrite, inputs=inputs, viewer=viewer)
-        self.check()
-        lesson = self.prepare()
-        with self.open_renderer(lesson.world) as renderer:
-            agent = self.agent(renderer, lesson)
-            start = agent.start(self.offset_m)
-            learned = taught(lesson, renderer)
-            settings = {each.name: getattr(self, each.name) for each in dataclasses.fields(RunOptions)}
-            if lesson.saved is not None:  # they say nothing of what a model from a file has learned
-                settings = {key: value for key, value in settings.items() if key not in ("every", "learning_walk_m")}
-            n_views = None if learned is None else len(learned)
-            settings |= {"encoding": str(lesson.encoding), "renderer": renderer.backend, "n_views": n_views}
-            with progress("walking", "steps") as report:
-                return record_walk(
-                    agent, start, self.out, overwrite=self.overwrite, training_poses=learned, settings=settings,
-                    command=f"tussock run {words_of(self, RunOptions)} --out {shlex.quote(str(self.out))} --overwrite",
-                    viewer=viewer, progress=report,
-                )  # fmt: skip
+        files = [Path(name) for name in (self.world, self.route) if name is not None]
+        check_run_folder(self.out, overwrite=self.overwrite, inputs=files, viewer=viewer)
+        experiment = self.experiment()
+        with progress_of_parts() as report:
+            return record_run(
+                experiment,
+                self.out,
+                overwrite=self.overwrite,
+                viewer=viewer,
+                learning=partial(report, "learning"),
+                walking=partial(report, "walking"),
+            )
 
 
 @dataclass
@@ -239,13 +246,6 @@ class PlayCommand:
         from ..recording.run_folder import play
 
         return play(self.run_folder, web=self.web, screenshot=self.screenshot)
-
-
-def taught(lesson: Lesson, renderer: "Renderer") -> "np.ndarray | None":
-    """`Lesson.teach`, telling the person of it."""
-    say(f"renderer: {renderer.backend}")
-    with progress("learning", "views") as report:
-        return lesson.teach(renderer, report)
 
 
 def summary(cls: type) -> str:

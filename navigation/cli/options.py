@@ -1,148 +1,181 @@
-"""What the commands share: flags that choose the world, the eye, the route and what is kept of a view."""
+"""What commands share: flags for the world, the eye, the route, what is learned, and how an agent walks.
+
+A flag has the name of a setting (see `tussock.navigation.experiment_settings`), and its default is the experiment's.
+"""
 
 import dataclasses
-import math
 import shlex
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
+import attrs
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.render.eye import Eye
 
-from .terminal import saying_when_slow
+from ..body import Body
+from ..experiment_settings import TYPES, degrees, experiment_of, surroundings_of
+from ..stopping import StoppingRules
+from ..surroundings import Surroundings
+from ..training_setup import TrainingSetup
+from .terminal import message_when_slow
 
 if TYPE_CHECKING:
-    from tussock.render.eye import Eye
-    from tussock.world.geometry import Route
+    from tussock.render.renderer import Renderer
     from tussock.world.scene import World
 
-    from ..encoding import Encoding
+    from ..experiment import Experiment
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny), grown from a seed; its parameters may follow, as in "
-    "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...)."
+    "A preset's name (tussock-field, meadow, scrub, tiny), generated from a seed; its parameters may follow, as in "
+    "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
 )
 
-ROUTE_SPACING = (
-    0.02  # m, between the route views of a database and of the studies: docs/report.md derives it from the thesis
-)
+
+def default(kind: type, field: str) -> Any:
+    """The default of a field of settings."""
+    return attrs.fields_dict(kind)[field].default if attrs.has(kind) else getattr(kind, field)
 
 
 @dataclass
-class SightOptions:
+class ViewOptions:
     """What world is seen, through what eye."""
 
-    world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
+    world: Annotated[str, tyro.conf.arg(help=WORLD)] = default(Surroundings, "world")
     world_seed: int | None = None
     """Seed of a generated world. Default: --seed."""
-    seed: int = 0
+    seed: int = default(Surroundings, "seed")
     """Seed of everything random: the world and route where they are generated, the model's start, the heading noise."""
     size: str | None = None
     """Columns x rows of a panorama; a pixel wider than a degree is averaged from several rays. Default: 720x150, or the model file's."""
-    renderer: str = "auto"
+    renderer: str = default(Surroundings, "renderer")
     """auto (the fastest here), cpu, egl or osmesa."""
     samples: int | None = None
     """Rays along each side of a pixel. Default: 1 where a pixel is at most a degree wide, else 4."""
-    eye_height_m: float = 0.01
+    eye_height_m: float = default(Eye, "z")
     """Height of the eye above z = 0."""
-    top_deg: float = 60.0
+    top_deg: float = degrees(default(Eye, "top"))
     """Elevation of a panorama's upper edge."""
-    bottom_deg: float = -15.0
+    bottom_deg: float = degrees(default(Eye, "bottom"))
     """Elevation of its lower edge."""
-    cull_back_faces: bool = False
+    cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
 
-    def open_world(self):
-        from tussock.world.files import open_world
+    def settings(self) -> dict[str, Any]:
+        """The settings of a run that these flags give."""
+        names = [each.name for each in dataclasses.fields(self) if each.name in TYPES]
+        return {name: getattr(self, name) for name in names}
 
-        world = open_world(self.world, self.seed if self.world_seed is None else self.world_seed)
-        return dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
-
-    def width_and_height(self) -> tuple[int, int]:
-        """Columns and rows of a panorama."""
-        width, cross, height = (self.size or "720x150").lower().partition("x")
-        if not (cross and width.isdecimal() and height.isdecimal()):
-            raise InputError(f"size {self.size!r}: give columns x rows, for example 720x150")
-        return int(width), int(height)
-
-    def eye(self) -> "Eye":
-        """The eye that these flags describe."""
-        from tussock.render import Eye
-
-        width, height = self.width_and_height()
-        return Eye(
-            width=width, height=height, top=math.radians(self.top_deg), bottom=math.radians(self.bottom_deg),
-            z=self.eye_height_m, samples=self.samples,
-        )  # fmt: skip
-
-    def open_renderer(self, world, threads: int | None = None):
-        from tussock.render import open_renderer
-
-        with saying_when_slow(
-            "opening the renderer; where it is used for the first time, it is compiled, which takes some seconds"
-        ):
-            return open_renderer(world, self.eye(), self.renderer, threads=threads)
+    def surroundings(self) -> Surroundings:
+        """The world, the route and the eye that these flags describe."""
+        return surroundings_of(self.settings())
 
 
 @dataclass
-class PathOptions(SightOptions):
+class PathOptions(ViewOptions):
     """What world is seen, through what eye, and a route through it."""
 
     route: Path | None = None
     """A route file (.csv or AntWorld .bin); without it one is generated."""
     route_seed: int | None = None
     """Seed of a generated route. Default: --seed."""
-    route_length_m: float = 8.0
+    route_length_m: float = default(Surroundings, "route_length")
     """Length of a generated route."""
-
-    def open_route(self) -> tuple["World", "Route"]:
-        """The world, and the route through it."""
-        from tussock.world.route_files import read_route
-        from tussock.world.routes import check_route, generate_route
-
-        route = read_route(self.route) if self.route else None
-        world = self.open_world()
-        if route is None:
-            route = generate_route(
-                world, self.seed if self.route_seed is None else self.route_seed, self.route_length_m
-            )
-        check_route(world, route)
-        return world, route
 
 
 @dataclass
-class RouteOptions(PathOptions):
-    """Along which route views are learned, and what is kept of them."""
+class LearningOptions(PathOptions):
+    """What is learned along the route."""
 
     encoding: str | None = None
-    """edges (the default), grey or sky; or a chain of steps, such as 'sky-mask | vertical-edges | resize 6 | normalise'."""
+    """edges (the default), grey or sky; or a chain of steps, such as 'foreground-mask | vertical-edges | resize 6 | normalise'."""
     resize: float | None = None
-    """Factor by which a view's width and height are reduced. Default: whatever brings the width down to 120."""
+    """Factor by which a view's width and height are reduced. Default: so that the width is 120."""
     blur: float = 0.0
     """Standard deviation (pixels of the view) of Gaussian smoothing before all else; 0 is none."""
-    spacing_m: float = 0.04
+    spacing_m: float = default(TrainingSetup, "spacing")
     """Distance between route views."""
-    every: int = 1
-    """Learn one route view in so many."""
+    every: int = default(TrainingSetup, "every")
+    """Learn every N-th route view."""
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
     device: str = "cpu"
     """Where the model learns and scans: cpu, cuda, or another device of torch's."""
 
-    def chosen_encoding(self) -> "Encoding":
-        """The encoding that these flags spell."""
-        from ..encoding import Encoding
-
-        name = self.encoding or "edges"
-        automatic = 1.0 if "|" in name else max(1.0, self.width_and_height()[0] / 120)
-        return Encoding.named(name, resize=automatic if self.resize is None else self.resize, blur=self.blur)
+    def experiment(self) -> "Experiment":
+        """The experiment that these flags describe. Raises InputError."""
+        return experiment_of(self.settings())
 
 
-def words_of(options: object, kind: type, leave_out: Collection[str] = ()) -> str:
-    """The flags that spell options, those of the fields of `kind` that are not as by default, as they are typed."""
+@dataclass
+class ModelOptions(LearningOptions):
+    """What learns."""
+
+    model: str = "perfect-memory"
+    """A model's name (see tussock models), or a file that tussock train wrote: it knows its views, encoding and size.
+    Parameters may follow the name, as in 'mushroom-body inputs=10 cells=20000' or 'mlp hidden_layer_sizes=100,50'.
+    A model of your own is package.module:Class."""
+    threads: int | None = None
+    """Threads to draw, learn and match with. Default: one a core. What networks learn depends on it in its last digits."""
+    use: str = ""
+    """Classes of your own that the file of a model needs, as package.module:Class; several with commas between them."""
+
+    def experiment(self) -> "Experiment":
+        """The experiment that these flags describe. Raises InputError."""
+        if self.use:
+            from ..encoding import STEPS
+            from ..models import MODELS
+
+            for name in filter(None, map(str.strip, self.use.split(","))):
+                MODELS.find(name)
+                STEPS.register(name, MODELS.find(name))
+        return super().experiment()
+
+
+@dataclass
+class RunOptions(ModelOptions):
+    """What a model learns, and how an agent walks: everything that decides a run."""
+
+    learning_walk_m: float = default(TrainingSetup, "learning_walk")
+    """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
+    step_m: float = default(Body, "step_length")
+    """Length of a step."""
+    offset_m: float = 0.0
+    """Start this far to the left of the route (negative: right)."""
+    heading_noise_deg: float = degrees(default(Body, "heading_noise"))
+    """Standard deviation of the noise on every turn."""
+    scan_deg: float | None = None
+    """Width of the scan. Default: 180."""
+    scan_about_deg: float | None = None
+    """Centre the scan on this direction of the world instead of the present heading."""
+    on_lost: Annotated[str, tyro.conf.arg(metavar="stop|reset")] = "stop"
+    """stop, or reset: put the agent back on the route at the waypoint after the furthest one reached, and count it."""
+    waypoint_m: float = default(StoppingRules, "waypoint_spacing")
+    """Distance along the route between these waypoints."""
+    arrive_m: float = default(StoppingRules, "arrival_radius")
+    """Arrived within this distance of the route's end."""
+    lost_m: float = default(StoppingRules, "max_deviation")
+    """Lost beyond this distance from the route."""
+    patience_m: float = default(StoppingRules, "patience")
+    """Stuck after walking this far without getting farther along the route."""
+    max_steps: int | None = None
+    """Limit of steps. Default: as many as three times the route's length needs."""
+    navigator: str = "scan"
+    """What steers: scan turns to the most familiar heading. Parameters may follow the name. One of your own is package.module:Class."""
+
+
+def open_renderer(surroundings: Surroundings, world: "World") -> "Renderer":
+    """A renderer; a message tells what takes long, where it is compiled first."""
+    with message_when_slow(
+        "opening the renderer; where it is used for the first time, it is compiled, which takes some seconds"
+    ):
+        return surroundings.open_renderer(world)
+
+
+def flags_of(options: object, kind: type, leave_out: Collection[str] = ()) -> str:
+    """The flags that give options, those of the fields of `kind` that are not as by default, as they are typed."""
     words = []
     for each in dataclasses.fields(kind):
         value = getattr(options, each.name)

@@ -9,9 +9,10 @@ import tyro
 
 from tussock.world.errors import InputError
 
-from .options import WORLD, words_of
+from .options import WORLD, flags_of
 from .sweeps import check_workers
-from .terminal import progress, say
+from .terminal import message as say
+from .terminal import progress
 
 if TYPE_CHECKING:
     from ..studies.protocols import Protocol
@@ -56,10 +57,10 @@ class ProtocolCommand:
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
         say(f"{len(sweep)} runs: {', '.join(f'{len(choices)} of {name}' for name, choices in sweep.axes.items())}")
-        given = words_of(self, type(self), leave_out=("scheduler", "workers", "out", "overwrite", "json", "route"))
+        given = flags_of(self, type(self), leave_out=("scheduler", "workers", "out", "overwrite", "json", "route"))
         given = " ".join([given] * bool(given) + [shlex.join(["--route", str(route)]) for route in self.routes()])
         command = f"tussock replicate {self.PROTOCOL}{' ' * bool(given)}{given} --out {shlex.quote(str(out))}"
-        with progress("walking", "runs", aloud=True) as report:
+        with progress("walking", "runs", verbose=True) as report:
             return replicate(
                 protocol, sweep, out, about=about, command=command, scheduler=self.scheduler, workers=self.workers, progress=report
             )  # fmt: skip

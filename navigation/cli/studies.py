@@ -9,8 +9,10 @@ import tyro
 
 from tussock.world.errors import InputError
 
-from .options import ROUTE_SPACING, PathOptions, words_of
-from .terminal import progress_of_parts, say
+from ..training_setup import ROUTE_SPACING
+from .options import PathOptions, flags_of
+from .terminal import message as say
+from .terminal import progress_of_parts
 
 if TYPE_CHECKING:
     from ..studies.thesis.material import Material
@@ -125,7 +127,7 @@ class StudyOptions(PathOptions):
     def command(self) -> str:
         """How one figure of the report is made alone; {study} and {figure} are to be filled in."""
         given = (
-            words_of(self, StudyOptions, leave_out=("out", "overwrite", "json")).replace("{", "{{").replace("}", "}}")
+            flags_of(self, StudyOptions, leave_out=("out", "overwrite", "json")).replace("{", "{{").replace("}", "}}")
         )
         return f"tussock study {{study}} --figure {{figure}}{' ' * bool(given)}{given} --out {{name}}"
 

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 
-from .terminal import progress, say
+from .terminal import message, progress
 
 
 @dataclass
@@ -30,18 +30,18 @@ class SweepCommand:
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        from ..sweeps.spec import read_sweep
+        from ..sweeps.sweep_file import read_sweep
 
         record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
         if record is None:
-            raise InputError(f"--record {self.record!r}: give worst:5, or another number")
+            raise SettingError(f"--record {self.record!r}: give worst:5, or another number")
         check_workers(self.scheduler, self.workers)
         sweep = read_sweep(self.sweep)
 
         from ..sweeps.sweep import record_worst, run_sweep
 
-        say(f"{len(sweep)} runs: {', '.join(f'{len(choices)} of {name}' for name, choices in sweep.axes.items())}")
-        with progress("walking", "runs", aloud=True) as report:
+        message(f"{len(sweep)} runs: {sweep}")
+        with progress("walking", "runs", verbose=True) as report:
             done = run_sweep(sweep, self.out, scheduler=self.scheduler, workers=self.workers, progress=report)
         recorded = record_worst(sweep, self.out, int(record[1])) if self.record else []
         return done | {"recordings": [str(folder) for folder in recorded]}
@@ -49,7 +49,7 @@ class SweepCommand:
 
 @dataclass
 class ReportCommand:
-    """Say what the runs of a sweep come to: a page with success and error by each axis, models in pairs, and the worst walks."""
+    """Report the results of a sweep: a page with success and error by each axis, models in pairs, and the worst walks."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
     """Folder of the sweep; it may still go on."""
@@ -62,7 +62,7 @@ class ReportCommand:
         from ..sweeps.report import REPORT, RESULTS, write_sweep_report
 
         if self.worst < 0:
-            raise InputError(f"--worst {self.worst}: give 0 or more")
+            raise SettingError(f"--worst {self.worst}: give 0 or more")
         with progress("drawing", "figures") as report:
             results = write_sweep_report(self.folder, worst=self.worst, progress=report)
         return {
@@ -72,8 +72,8 @@ class ReportCommand:
 
 
 def check_workers(scheduler: str | None, workers: int | None) -> None:
-    """Refuse flags that say twice, or wrongly, who does the runs. Raises InputError."""
+    """Refuse contradicting flags on what does the runs. Raises SettingError."""
     if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: give at least 1")
+        raise SettingError(f"--workers {workers}: give at least 1")
     if scheduler is not None and workers is not None:
-        raise InputError("--workers are those on this machine; a scheduler has its own: give one of the two")
+        raise SettingError("--workers are those on this machine; a scheduler has its own: give one of the two")

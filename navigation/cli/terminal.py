@@ -1,5 +1,6 @@
-"""What people see of a command while it works: messages, progress, results."""
+"""What people see of a command: messages, progress, results."""
 
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -8,15 +9,22 @@ from threading import Timer
 from typing import Any
 
 
-def say(text: str) -> None:
-    """Tell the person something that is not the result."""
+def message(text: str) -> None:
+    """Print something that is not the result."""
     print(text, file=sys.stderr)
 
 
+class MessageHandler(logging.Handler):
+    """Prints what the library logs, as messages."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        message(record.getMessage())
+
+
 @contextmanager
-def saying_when_slow(text: str, seconds: float = 1.0) -> Iterator[None]:
-    """Say what takes so long, once it takes longer than `seconds`."""
-    timer = Timer(seconds, say, [text])
+def message_when_slow(text: str, seconds: float = 1.0) -> Iterator[None]:
+    """Print a message once the block takes longer than `seconds`."""
+    timer = Timer(seconds, message, [text])
     timer.daemon = True
     timer.start()
     try:
@@ -33,21 +41,25 @@ def progress_of_parts() -> Iterator[Callable[[str, int, int], object]]:
 
 
 @contextmanager
-def progress(what: str, unit: str, *, aloud: bool = False) -> Iterator[Callable[..., object]]:
+def progress(what: str, unit: str, *, verbose: bool = False) -> Iterator[Callable[..., object]]:
     """Show progress on standard error, where that is a terminal; gives a function report(done, total, description=what).
 
-    aloud: for work of hours: show the rate as well, and elsewhere, as in the log of a job, say a line now and then.
+    verbose: for work of hours: show the rate as well, and elsewhere, as in the log of a job, print a line now and then.
     """
     # Late: rich takes a tenth of a second that --help does not need.
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    words, numbers = TextColumn("{task.description}"), (MofNCompleteColumn(), TextColumn(unit), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn(unit),
+        TimeRemainingColumn(),
+    )
     console = Console(stderr=True)
-    pace = _Pace(unit) if aloud else None
-    with Progress(
-        words, BarColumn(), *numbers, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
+    pace = _Pace(unit) if verbose else None
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
 
         def report(done: int, total: int, **changed: Any) -> None:
@@ -55,21 +67,21 @@ def progress(what: str, unit: str, *, aloud: bool = False) -> Iterator[Callable[
                 pace.reached(done, total)
                 changed["description"] = f"{what} {pace.rate:.3g} a second"
                 if not console.is_terminal:
-                    pace.tell()
+                    pace.report()
             bar.update(task, completed=done, total=total, **changed)
 
         yield report
 
 
 class _Pace:
-    """How fast work goes on, in words."""
+    """How fast work goes on."""
 
     SECONDS = 30.0  # between two lines
 
     def __init__(self, unit: str):
         self.unit, self.done, self.total = unit, 0, 0
         self.first: int | None = None  # done before this began
-        self.began = self.told = time.monotonic()
+        self.began = self.reported = time.monotonic()
 
     def reached(self, done: int, total: int) -> None:
         if self.first is None:
@@ -81,17 +93,17 @@ class _Pace:
         """Of the work that was done here (1/s)."""
         return (self.done - (self.first or 0)) / max(time.monotonic() - self.began, 1e-9)
 
-    def tell(self) -> None:
-        """Say how far it is, unless that was said a moment ago."""
-        if self.rate and (time.monotonic() - self.told > self.SECONDS or self.done == self.total):
-            self.told = time.monotonic()
+    def report(self) -> None:
+        """Print how far it is, unless that was printed a moment ago."""
+        if self.rate and (time.monotonic() - self.reported > self.SECONDS or self.done == self.total):
+            self.reported = time.monotonic()
             minutes = (self.total - self.done) / self.rate / 60
-            say(f"{self.done} of {self.total} {self.unit}, {self.rate:.3g} a second, {minutes:.3g} min left")
+            message(f"{self.done} of {self.total} {self.unit}, {self.rate:.3g} a second, {minutes:.3g} min left")
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print a result for people: a line a value, a line each where a value is a list, a table where the rows have names, and a text
-    of several lines as it stands.
+    """Print a result for people: one line per value, one per item of a list, a table where rows have names, and a text of several lines
+    as it is.
     """
     width = max(map(len, result))
     for key, value in result.items():
@@ -119,7 +131,7 @@ def show_table(name: str, rows: dict[str, dict[str, Any]]) -> None:
     )
     for key, row in rows.items():
         table.add_row(key, *map(text, row.values()))
-    # Where nobody looks, as in a pipe, a line a row however long.
+    # In a pipe, one line per row, however long.
     console = Console()
     Console(width=console.width if console.is_terminal else 200).print(table)
 

@@ -1,4 +1,4 @@
-"""The commands that grow worlds and look at them: a dataclass with a field a flag. Heavy packages are imported where they are used."""
+"""The commands that make worlds and routes, and look at them. Heavy packages are imported where they are used."""
 
 import math
 from dataclasses import dataclass
@@ -7,15 +7,16 @@ from typing import Annotated, Any
 
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, SettingError
 
-from .options import WORLD, SightOptions
-from .terminal import say
+from ..surroundings import Surroundings
+from .options import WORLD, ViewOptions, open_renderer
+from .terminal import message
 
 
 @dataclass
 class WorldCommand:
-    """Grow a world and save it."""
+    """Generate a world and save it."""
 
     out: Path
     """File to write: .glb or .ply."""
@@ -45,11 +46,11 @@ class WorldCommand:
 
 
 @dataclass
-class ViewCommand(SightOptions):
+class ViewCommand(ViewOptions):
     """Draw the panorama seen at a pose."""
 
     at: Annotated[str | None, tyro.conf.arg(metavar="X,Y,HEADING_DEG")] = None
-    """Where to stand (m) and face (degrees counter-clockwise from +x, east). Default: the middle of the world, facing north."""
+    """Where the eye is (m) and faces (degrees counter-clockwise from +x, east). Default: the middle of the world, facing north."""
     out: Path = Path("view.png")
     """PNG to write: ahead in the middle, behind at both edges."""
     alpha: bool = False
@@ -64,14 +65,15 @@ class ViewCommand(SightOptions):
         from tussock.world.atomic import check_writable, replacing
 
         if self.out.suffix.lower() != ".png":
-            raise InputError(f"{self.out}: a view is written as .png")
+            raise FileError(f"{self.out}: a view is written as .png")
         check_writable(self.out)
-        world = self.open_world()
-        x, y, heading_deg = self.place(world.field)
-        with self.open_renderer(world) as renderer:
+        surroundings = self.surroundings()
+        world = surroundings.open_world()
+        x, y, heading_deg = self.position(world.field)
+        with open_renderer(surroundings, world) as renderer:
             view = renderer.render([(x, y, math.radians(heading_deg))])[0]
             backend = renderer.backend
-        say(f"renderer: {backend}")
+        message(f"renderer: {backend}")
         image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
         with replacing(self.out) as partial:
             partial.write_bytes(
@@ -79,13 +81,13 @@ class ViewCommand(SightOptions):
             )
         return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
 
-    def place(self, field) -> tuple[float, float, float]:
+    def position(self, field) -> tuple[float, float, float]:
         """x, y (m) and heading (degrees) to look from."""
         if self.at is None:
             return (field.x_min + field.x_max) / 2, (field.y_min + field.y_max) / 2, 90.0
         x, y, heading_deg = numbers(self.at, "--at", "X,Y,HEADING_DEG", "5,5,90")
         if not (math.isfinite(heading_deg) and field.contains(x, y)):
-            raise InputError(f"--at {self.at}: that is outside the world ({field}); choose a place inside")
+            raise SettingError(f"--at {self.at}: that is outside the world ({field}); choose a position inside")
         return x, y, heading_deg
 
 
@@ -115,11 +117,11 @@ class RouteCommand:
         from tussock.world.routes import generate_route
 
         if self.out.suffix.lower() != ".csv":
-            raise InputError(f"{self.out}: a route is written as .csv")
+            raise FileError(f"{self.out}: a route is written as .csv")
         check_writable(self.out)
         check_picture(self.picture)
         goal = None if self.goal is None else numbers(self.goal, "--goal", "X,Y", "5,5")
-        world = SightOptions(world=self.world, seed=self.seed).open_world()
+        world = Surroundings(world=self.world, seed=self.seed).open_world()
         seed = self.seed if self.route_seed is None else self.route_seed
         route = generate_route(world, seed, self.length_m, goal=goal)
         write_route(route, self.out)
@@ -137,15 +139,15 @@ def numbers(text: str, flag: str, form: str, example: str) -> tuple[float, ...]:
     except ValueError:
         found = ()
     if len(found) != form.count(",") + 1:
-        raise InputError(f"{flag} {text!r}: give {form}, for example {example}")
+        raise SettingError(f"{flag} {text!r}: give {form}, for example {example}")
     return found
 
 
 def check_picture(path: Path | None) -> None:
-    """Refuse a picture that could not be written after the work. Raises InputError."""
+    """Refuse a picture that could not be written after the work. Raises FileError."""
     from tussock.world.atomic import check_writable
 
     if path is not None:
         check_writable(path)
         if path.suffix.lower() not in (".png", ".svg"):
-            raise InputError(f"{path}: a picture from above is written as .png or .svg")
+            raise FileError(f"{path}: a picture from above is written as .png or .svg")

@@ -1,10 +1,11 @@
 """The familiarity models by name. Each is loaded when it is first used: one needs scikit-learn, which takes a second to import."""
 
+from functools import wraps
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tussock.world.errors import InputError
-from tussock.world.specs import parse_parameters, split_words
+from tussock.world.specs import Spec, parse_parameters, parse_spec, split_words
 
 from .base import Model
 
@@ -94,3 +95,21 @@ def make_model(name: str, **parameters) -> Model:
 
         return opponent(model)
     return model
+
+
+def model_spec(text: str) -> Spec:
+    """The spec of a model's text."""
+
+    def find(name: str):
+        cls = model_class(name.removeprefix(OPPONENT))
+        if not name.startswith(OPPONENT):
+            return cls
+        from .opponents import opponent
+
+        @wraps(cls)
+        def made(**parameters):
+            return opponent(cls(**parameters))
+
+        return made
+
+    return parse_spec(text, find)

@@ -64,7 +64,7 @@ class Following(Protocol):
     """One walk along what a `SequenceModel` learned, which remembers where it has come to."""
 
     @property
-    def place(self) -> float | None:
+    def progress(self) -> float | None:
         """Share of the learned sequence, 0 to 1, that it believes to have walked; None while it does not know."""
         ...
 
@@ -307,3 +307,8 @@ def all_bounded(tensor: torch.Tensor) -> bool:
         return True
     least, greatest = tensor.aminmax()
     return float(least) >= -LARGEST and float(greatest) <= LARGEST
+
+
+def memory_bytes(model: FamiliarityModel) -> int | None:
+    """Size of what a model has learned; None where it does not tell."""
+    return getattr(model, "memory_bytes", None)

@@ -56,7 +56,7 @@ class ChainWalk:
         self.active: int | None = None
 
     @property
-    def place(self) -> float | None:
+    def progress(self) -> float | None:
         """Share of the sequence, 0 to 1, that it believes to have walked; None while it is lost."""
         return None if self.active is None else self.active / max(1, len(self.chain.snapshots) - 1)
 

@@ -18,16 +18,16 @@ from tussock.world.errors import InputError
 
 from ..encoding import Encoding
 from . import make_model
-from .base import Model, check_device
+from .base import FamiliarityModel, Model, check_device
 
 HEADER, VERSION = "tussock", 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class SavedModel:
+class TrainedModel:
     """What a model file holds: the model, and the encoding, eye and poses (n, 3) of the views it learned, where they are known."""
 
-    model: Model
+    model: FamiliarityModel
     encoding: Encoding | None
     eye: Eye | None
     poses: Float[np.ndarray, "n 3"] | None
@@ -74,7 +74,7 @@ def first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-def load_model(path: str | os.PathLike, *, expect: str | None = None, device: str = "cpu") -> SavedModel:
+def load_model(path: str | os.PathLike, *, expect: str | None = None, device: str = "cpu") -> TrainedModel:
     """Read a trained model. Raises InputError for what is no such file, is damaged, or holds another model than `expect`."""
     path = Path(path)
     if not os.path.isfile(path):  # False for names too long, too
@@ -118,4 +118,4 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
         raise InputError(f"{path} is damaged, or of another version ({first_line(error)}); train it anew") from error
     if where is not None:
         check_poses(path, model, where)
-    return SavedModel(model=model, encoding=encoding, eye=eye, poses=where)
+    return TrainedModel(model=model, encoding=encoding, eye=eye, poses=where)

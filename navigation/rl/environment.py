@@ -1,6 +1,6 @@
 """Following a route as a Gymnasium environment, `tussock/RouteFollowing-v0`, alone and many side by side.
 
-Importing this module registers it. Nothing else here needs Gymnasium, which is an extra.
+Importing this module registers it. Gymnasium is an extra, which only this module needs.
 """
 
 from collections.abc import Sequence
@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 
-from ..stopping import check_count
-from .task import RouteTask, Walk
+from .task import Courses, Episode, RouteTask
 
 try:
     import gymnasium
@@ -31,9 +30,13 @@ ROUNDING = 1e-4  # share by which encoded views may leave the bounds that they h
 class RouteFollowing(gymnasium.Env):
     """See a panorama, turn, step: follow a route home. One walk is an episode.
 
-    render_mode: "rgb_array" or None. settings: as `RouteTask` has them.
     Actions are (turn, step): the turn to the left as a share of half a turn, -1 to 1, and the step as a share of the longest, 0 to 1.
-    A step earns the metres by which it takes the learner farther along the route (less than 0: back), and ARRIVAL where it arrives.
+    A step earns the metres by which it takes the learner farther along the route (less than 0: back), and ARRIVAL_REWARD where it
+    arrives.
+
+    Args:
+        render_mode: "rgb_array" or None.
+        settings: Those of `RouteTask`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012 - Gymnasium reads it from the class
@@ -42,26 +45,27 @@ class RouteFollowing(gymnasium.Env):
         self.task = RouteTask(**settings)
         self.render_mode = _render_mode(render_mode)
         self.observation_space, self.action_space = _spaces(self.task)
-        self._walk = Walk(self.task)
+        self._courses = Courses(self.task)
+        self._episode = Episode(self._courses)
 
     def reset(self, *, seed: int | np.integer | None = None, options: dict[str, Any] | None = None):
-        """Begin another walk; options: world and start, see `Walk.begin`."""
+        """Begin another episode; options: world and start, see `Episode.begin`."""
         super().reset(seed=_seed(seed))
-        info = self._walk.begin(self.np_random, options)
+        info = self._episode.begin(self.np_random, options)
         return self._look(), info
 
     def step(self, action: np.ndarray):
         """Turn, step and look."""
-        reward, terminated, truncated, info = self._walk.step(action)
+        reward, terminated, truncated, info = self._episode.step(action)
         return self._look(), reward, terminated, truncated, info
 
     def _look(self) -> np.ndarray:
-        (observation,), (self._view,) = self.task.observe([self._walk])
+        (observation,), (self._view,) = self._courses.observe([self._episode])
         return observation
 
     def training_views(self, *, learning_walk: float = 0.2, spacing: float = 0.04):
-        """Observations of the present route and the poses they were made at, to learn it from; see `RouteTask.training_views`."""
-        return self.task.training_views(self._walk.seed, learning_walk=learning_walk, spacing=spacing)
+        """Observations of the present route and the poses they were made at, to learn it from; see `Courses.training_views`."""
+        return self._courses.training_views(self._episode.seed, learning_walk=learning_walk, spacing=spacing)
 
     def render(self) -> np.ndarray | None:
         """The present panorama, RGB, enlarged."""
@@ -69,7 +73,7 @@ class RouteFollowing(gymnasium.Env):
 
     def close(self) -> None:
         """Free what the renderers hold."""
-        self.task.close()
+        self._courses.close()
 
 
 class RouteFollowingVector(VectorEnv):
@@ -82,14 +86,16 @@ class RouteFollowingVector(VectorEnv):
         self, num_envs: int = 1, *, render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP, **settings: Any,
     ):  # fmt: skip
-        check_count("environments", num_envs)
-        self.task, self.num_envs = RouteTask(**settings), num_envs
+        if isinstance(num_envs, bool) or not isinstance(num_envs, Integral) or num_envs < 1:
+            raise SettingError(f"{num_envs!r} environments; give a whole number from 1")
+        self.task, self.num_envs = RouteTask(**settings), int(num_envs)
         self.render_mode, self._autoreset = _render_mode(render_mode), AutoresetMode(autoreset_mode)
         self.metadata = RouteFollowing.metadata | {"autoreset_mode": self._autoreset}
         self.single_observation_space, self.single_action_space = _spaces(self.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._walks = [Walk(self.task) for _ in range(num_envs)]
+        self._courses = Courses(self.task)
+        self._episodes = [Episode(self._courses) for _ in range(num_envs)]
         self._randoms = [np_random()[0] for _ in range(num_envs)]
         self._observations = np.zeros(self.observation_space.shape or (), self.observation_space.dtype)
         self._views = np.zeros((num_envs, self.task.eye.height, self.task.eye.width, 4), np.uint8)
@@ -106,14 +112,14 @@ class RouteFollowingVector(VectorEnv):
             first = _seed(seed)
             seeds = [None if first is None else first + k for k in range(self.num_envs)]
         if len(seeds) != self.num_envs:
-            raise InputError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each")
+            raise SettingError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each")
         options = dict(options or {})
         rows = np.flatnonzero(self._mask(options.pop("reset_mask", np.ones(self.num_envs, bool))))
         infos: dict[str, Any] = {}
         for k in rows.tolist():
             if seeds[k] is not None:
                 self._randoms[k] = np_random(seeds[k])[0]
-            infos = self._add_info(infos, self._walks[k].begin(self._randoms[k], options), k)
+            infos = self._add_info(infos, self._episodes[k].begin(self._randoms[k], options), k)
         self._ended[rows] = False
         self._look(rows)
         return self._observations.copy(), infos
@@ -124,11 +130,11 @@ class RouteFollowingVector(VectorEnv):
         self._check(actions, np.flatnonzero(~begins))
         rewards, terminations, truncations = np.zeros(self.num_envs), *np.zeros((2, self.num_envs), bool)
         each: list[dict[str, Any]] = []
-        for k, walk in enumerate(self._walks):
+        for k, episode in enumerate(self._episodes):
             if begins[k]:
-                each.append(walk.begin(self._randoms[k], None))
+                each.append(episode.begin(self._randoms[k], None))
             else:
-                rewards[k], terminations[k], truncations[k], info = walk.step(actions[k])
+                rewards[k], terminations[k], truncations[k], info = episode.step(actions[k])
                 each.append(info)
         self._look(np.arange(self.num_envs))
         self._ended = terminations | truncations
@@ -138,34 +144,34 @@ class RouteFollowingVector(VectorEnv):
             for k in rows.tolist():
                 final = {"final_obs": self._observations[k].copy(), "final_info": each[k]}
                 infos = self._add_info(infos, final, k)
-                each[k] = self._walks[k].begin(self._randoms[k], None)
+                each[k] = self._episodes[k].begin(self._randoms[k], None)
             self._look(rows)
         for k, info in enumerate(each):
             infos = self._add_info(infos, info, k)
         return self._observations.copy(), rewards, terminations, truncations, infos
 
     def _look(self, rows: np.ndarray) -> None:
-        self._observations[rows], self._views[rows] = self.task.observe([self._walks[k] for k in rows])
+        self._observations[rows], self._views[rows] = self._courses.observe([self._episodes[k] for k in rows])
 
     def _check(self, actions: np.ndarray, rows: np.ndarray) -> None:
-        """Refuse actions before any of these walks has moved. Raises InputError."""
+        """Refuse actions before any of these walks has moved. Raises SettingError."""
         try:
             shape = np.shape(actions)
         except ValueError as error:
-            raise InputError(f"actions: {error}; give an array of shape {self.action_space.shape}") from error
+            raise SettingError(f"actions: {error}; give an array of shape {self.action_space.shape}") from error
         if shape != self.action_space.shape:
-            raise InputError(f"actions of shape {shape}; give {self.action_space.shape}")
+            raise SettingError(f"actions of shape {shape}; give {self.action_space.shape}")
         for k in rows.tolist():
-            self._walks[k].check(actions[k])
+            self._episodes[k].check(actions[k])
 
     def _mask(self, mask: np.ndarray) -> np.ndarray:
         if np.shape(mask) != (self.num_envs,) or np.asarray(mask).dtype != bool or not np.any(mask):
-            raise InputError(f"reset_mask {mask}; give {self.num_envs} booleans, at least one of them True")
+            raise SettingError(f"reset_mask {mask}; give {self.num_envs} booleans, at least one of them True")
         return mask
 
     def training_views(self, k: int = 0, *, learning_walk: float = 0.2, spacing: float = 0.04):
-        """Observations of the present route of walk `k`, and their poses; see `RouteTask.training_views`."""
-        return self.task.training_views(self._walks[k].seed, learning_walk=learning_walk, spacing=spacing)
+        """Observations of the present route of walk `k`, and their poses; see `Courses.training_views`."""
+        return self._courses.training_views(self._episodes[k].seed, learning_walk=learning_walk, spacing=spacing)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """The present panoramas, RGB, enlarged."""
@@ -173,7 +179,7 @@ class RouteFollowingVector(VectorEnv):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Free what the renderers hold."""
-        self.task.close()
+        self._courses.close()
 
 
 def _spaces(task: RouteTask) -> tuple[Box, Box]:
@@ -188,17 +194,17 @@ def _spaces(task: RouteTask) -> tuple[Box, Box]:
 
 
 def _seed(seed: Any) -> int | None:
-    """A seed as Gymnasium takes it, which knows Python's own whole numbers only. Raises InputError for what is none."""
+    """A seed as Gymnasium takes it, which knows Python's own whole numbers only. Raises SettingError for what is none."""
     if seed is None:
         return None
     if not isinstance(seed, Integral) or int(seed) < 0:
-        raise InputError(f"the seed is {seed!r}; give a whole number >= 0")
+        raise SettingError(f"the seed is {seed!r}; give a whole number >= 0")
     return int(seed)
 
 
 def _render_mode(mode: str | None) -> str | None:
     if mode not in (None, *RouteFollowing.metadata["render_modes"]):
-        raise InputError(f"render mode {mode!r}; give 'rgb_array' or None")
+        raise SettingError(f"render mode {mode!r}; give 'rgb_array' or None")
     return mode
 
 

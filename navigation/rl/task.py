@@ -1,6 +1,5 @@
-"""Following a route as a task for a learner: the worlds and routes it is set, what it sees, what its steps earn, when it ends."""
+"""Following a route as a task for a learner: what it sees, what its steps earn, and when an episode ends."""
 
-import dataclasses
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,40 +11,22 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.render.eye import Eye
-from tussock.render.renderer import Renderer, open_renderer
-from tussock.world.errors import InputError
-from tussock.world.files import open_world
-from tussock.world.generate import seeded
+from tussock.render.renderer import Renderer
+from tussock.world.errors import SettingError
 from tussock.world.geometry import Pose, Route
 from tussock.world.params import is_generated
-from tussock.world.route_files import read_route
-from tussock.world.routes import check_route, generate_route
 from tussock.world.scene import World
+from tussock.world.settings import instance_of, number, settings, whole
 
+from ..body import Body
 from ..encoding import Encoding
-from ..stopping import (
-    ARRIVED,
-    NUMBER,
-    OUT_OF_STEPS,
-    Progress,
-    Rules,
-    check_count,
-    check_distance,
-    check_limits,
-    check_noise,
-)
+from ..experiment import Experiment
+from ..steering.navigator import Motion
+from ..stopping import StoppingRules, StopReason
 from ..training import training_poses, training_views
+from ..walk import Walk, check_inside
 
-EYE = Eye(width=90, height=25)  # a pixel is 4 degrees wide and 3 high
-ARRIVAL = 1.0  # m; what arriving earns on top of the way: who passes the goal to the side has come as far
-
-# What settings may be, and how to say so.
-KINDS = {
-    "world": (str | os.PathLike | World, "a preset's name, a file or a World"),
-    "route": (Route | str | os.PathLike | None, "a Route or its file"),
-    "eye": (Eye, "an Eye"),
-    "encoding": (Encoding | str | None, "its name or its steps"),
-}
+ARRIVAL_REWARD = 1.0  # on top of the metres: a learner that passes the goal to the side has come as far
 
 Observations = np.ndarray  # (n, height, width, 3) uint8, or (n, h, w) float32
 Outcome = tuple[float, bool, bool, dict[str, Any]]  # reward, terminated, truncated, info
@@ -53,197 +34,244 @@ Outcome = tuple[float, bool, bool, dict[str, Any]]  # reward, terminated, trunca
 
 @dataclass(frozen=True)
 class Course:
-    """A world that is open to be seen, and the rules of following a route through it."""
+    """A route in an open world.
+
+    Attributes:
+        renderer: Draws what is seen there.
+        route: The route to follow.
+    """
 
     renderer: Renderer
-    rules: Rules
+    route: Route
 
 
-@dataclass(frozen=True, kw_only=True)
+@settings
 class RouteTask:
     """Which routes are to be followed, and how.
 
-    world: a preset's name, a file, or a world. world_seed: of the world and route, where they are generated.
-    worlds: how many there are, of the seeds from `world_seed` on; each walk is set one of them at random.
-    route: a route, or its file; None generates one of `length` (m). eye: through which the learner sees.
-    encoding: of what it sees, a name or a chain (see `Encoding.named`); None leaves the panorama as it is.
-    renderer: "auto", "cpu", "egl" or "osmesa". offset: walks start up to this far to either side of the route's start (m).
-    heading_noise: standard deviation of the normal noise on every turn (rad), drawn from the walk's generator as an `Agent` draws it.
-    step_length: of the longest step (m). arrive, lost, patience, max_steps: when a walk ends; as for an `Agent`.
+    Attributes:
+        world: A preset's name, a file, or a `World`.
+        world_seed: Of the world and the route, where they are generated.
+        worlds: How many worlds there are, of the seeds from `world_seed` on; each episode is in one of them, at random.
+        route: A `Route`, its file, or None to generate one.
+        length: Of a generated route (m).
+        eye: Through which the learner sees.
+        encoding: What it gets of a view: a preset's name, a chain or an `Encoding`; None is the panorama itself.
+        renderer: "auto", "cpu", "egl" or "osmesa".
+        offset: Episodes start up to this far to either side of the route's start (m).
+        heading_noise: Standard deviation of the normal noise on every turn (rad).
+        step_length: Length of the longest step (m).
+        arrive: The episode has arrived within this distance of the route's end (m).
+        lost: It is lost farther than this from the route (m).
+        patience: It is stuck after this distance without getting farther along the route (m).
+        max_steps: Limit of steps; None means as many as three times the route's length needs.
     """
 
-    world: str | os.PathLike | World = "tussock-field"
-    world_seed: int = 0
-    worlds: int = 1
-    route: Route | str | os.PathLike | None = None
-    length: float = 8.0
-    eye: Eye = EYE
-    encoding: Encoding | str | None = None
+    world: Any = instance_of(str | os.PathLike | World, "tussock-field", "a preset's name, a file or a World")
+    world_seed: int = whole(0, low=0)
+    worlds: int = whole(1)
+    route: Any = instance_of(Route | str | os.PathLike | None, None, "a Route or its file")
+    length: float = number(8.0, above=0, unit="m")
+    eye: Eye = instance_of(Eye, Eye(width=90, height=25), "an Eye")  # a pixel is 4 degrees wide and 3 high
+    encoding: Any = instance_of(Encoding | str | None, None, "its name or its steps")
     renderer: str = "auto"
-    offset: float = 0.1
-    heading_noise: float = 0.0
-    step_length: float = 0.05
-    arrive: float = 0.15
-    lost: float = 0.5
-    patience: float = 3.0
-    max_steps: int | None = None
-    _courses: dict[int, Course] = dataclasses.field(default_factory=dict, init=False, repr=False, compare=False)
+    offset: float = number(0.1, low=0, unit="m")
+    heading_noise: float = number(0.0, low=0, unit="rad")
+    step_length: float = number(0.05, above=0, unit="m")
+    arrive: float = number(0.15, above=0, unit="m")
+    lost: float = number(0.5, above=0, unit="m")
+    patience: float = number(3.0, above=0, unit="m")
+    max_steps: int | None = whole(None, optional=True)
 
-    def __post_init__(self):
-        for name, (kinds, wanted) in KINDS.items():
-            if not isinstance(getattr(self, name), kinds):
-                raise InputError(f"the {name} is {getattr(self, name)!r}; give {wanted}")
-        check_count("worlds", self.worlds)
-        seeded(self.world_seed)  # refuses what is no seed
-        if self.worlds > 1 and not (isinstance(self.world, str) and is_generated(self.world) and self.route is None):
-            raise InputError(f"{self.worlds} worlds are grown from a preset, with a route each; give one, and no route")
-        check_limits(self)
-        check_distance("length", self.length)
-        if not (isinstance(self.offset, NUMBER) and 0 <= self.offset < self.lost):
-            raise InputError(
-                f"an offset of {self.offset} m; give 0 or more, and less than {self.lost} m, which is lost"
+    def __attrs_post_init__(self):
+        generated = isinstance(self.world, str) and is_generated(self.world) and self.route is None
+        if self.worlds > 1 and not generated:
+            raise SettingError(
+                f"{self.worlds} worlds are generated from a preset, with a route each; give one, and no route"
             )
-        check_noise(self.heading_noise)
-        _ = self.chain  # refuses what is no encoding
+        if self.offset >= self.lost:
+            raise SettingError(f"an offset of {self.offset} m; give less than {self.lost} m, which is lost")
+        _ = self.experiment, self.chain  # refuses what they refuse
+
+    @cached_property
+    def experiment(self) -> Experiment:
+        """The experiment that an episode is a walk of, in the first world."""
+        return Experiment(
+            world=self.world if isinstance(self.world, World) else os.fspath(self.world),
+            route=self.route,
+            route_length=self.length,
+            eye=self.eye,
+            body=Body(step_length=self.step_length, heading_noise=self.heading_noise),
+            stopping=StoppingRules(
+                arrival_radius=self.arrive, max_deviation=self.lost, patience=self.patience, max_steps=self.max_steps
+            ),
+            seed=self.world_seed,
+            renderer=self.renderer,
+        )
 
     @cached_property
     def chain(self) -> Encoding | None:
-        """The encoding that was asked for."""
+        """The encoding that is asked for."""
         return Encoding.named(self.encoding) if isinstance(self.encoding, str) else self.encoding
 
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_courses": {}}  # they are opened again where they are needed
+    def encoded(self, views: UInt8[np.ndarray, "n height width 4"]) -> Observations:
+        """What a learner gets of views."""
+        return views[..., :3].copy() if self.chain is None else self.chain(views).numpy()
 
-    def course(self, seed: int) -> Course:
-        """The world and route of a seed, which are opened when they are first asked for."""
-        if seed not in self._courses:
-            world = self.world if isinstance(self.world, World) else open_world(os.fspath(self.world), seed)
-            route = self.route
-            if route is None:
-                route = generate_route(world, seed, self.length)
-            elif not isinstance(route, Route):
-                route = read_route(route)
-            check_route(world, route)
-            rules = Rules(
-                route=route, field=world.field, step_length=self.step_length, arrive=self.arrive, lost=self.lost,
-                patience=self.patience, max_steps=self.max_steps,
-            )  # fmt: skip
+
+class Courses:
+    """The worlds and routes of a task, each opened when it is first needed."""
+
+    def __init__(self, task: RouteTask):
+        self.task = task
+        self._open: dict[int, Course] = {}
+
+    def __getitem__(self, seed: int) -> Course:
+        """The course of a seed."""
+        if seed not in self._open:
+            experiment = self.task.experiment.replace(seed=seed)
+            world = experiment.open_world()
+            route = experiment.open_route(world)
             for side in (-1, 1):
-                rules.check_inside(route.start.moved(0.0, side * self.offset))
-            self._courses[seed] = Course(open_renderer(world, self.eye, self.renderer), rules)
-        return self._courses[seed]
+                check_inside(route.start.moved(0.0, side * self.task.offset), world.field)
+            self._open[seed] = Course(experiment.open_renderer(world), route)
+        return self._open[seed]
 
     def close(self) -> None:
         """Free what the renderers hold."""
-        for course in self._courses.values():
+        for course in self._open.values():
             course.renderer.close()
-        self._courses.clear()
+        self._open.clear()
 
-    def encoded(self, views: UInt8[np.ndarray, "n height width 4"]) -> Observations:
-        """What a learner gets to see of views."""
-        return views[..., :3].copy() if self.chain is None else self.chain(views).numpy()
+    def __reduce__(self):
+        """Sent to another process, they are opened anew there."""
+        return Courses, (self.task,)
 
-    def observe(self, walks: "Sequence[Walk]") -> tuple[Observations, UInt8[np.ndarray, "n height width 4"]]:
-        """What walks see where they are, encoded and as it is. The renderer of each world is called once."""
-        views = np.empty((len(walks), self.eye.height, self.eye.width, 4), np.uint8)
-        for seed in {walk.seed for walk in walks}:
-            here = [k for k, walk in enumerate(walks) if walk.seed == seed]
-            views[here] = self.course(seed).renderer.render([walks[k].pose for k in here])
-        return self.encoded(views), views
+    def observe(self, episodes: "Sequence[Episode]") -> tuple[Observations, UInt8[np.ndarray, "n height width 4"]]:
+        """What is seen in episodes, encoded and as it is. The renderer of each world is called once."""
+        eye = self.task.eye
+        views = np.empty((len(episodes), eye.height, eye.width, 4), np.uint8)
+        for seed in {episode.seed for episode in episodes}:
+            here = [k for k, episode in enumerate(episodes) if episode.seed == seed]
+            views[here] = self[seed].renderer.render([episodes[k].pose for k in here])
+        return self.task.encoded(views), views
 
     def training_views(
         self, seed: int, *, learning_walk: float = 0.2, spacing: float = 0.04
     ) -> tuple[Observations, Float[np.ndarray, "n 3"]]:
-        """What a learner is shown of the route of a seed before it walks, and at which poses; see `training_poses`.
+        """What a learner is shown of the route of a seed before it walks, and the poses of these views.
 
-        learning_walk: reach to both sides of the route (m); 0 shows it the route only. spacing: of the views along the route (m).
-        Encoded views that show nothing are left out (see `navigation.training.training_views`).
+        Args:
+            seed: Of the world.
+            learning_walk: Reach to both sides of the route (m); 0 shows the route only.
+            spacing: Distance between views along the route (m).
+
+        Encoded views without contrast are left out (see `tussock.navigation.training.training_views`).
         """
-        course = self.course(seed)
-        views_of = course.rules.route.resampled(spacing)
-        poses = training_poses(views_of, learning_walk=learning_walk, field=course.rules.field)
-        if self.chain is None:
-            return self.encoded(course.renderer.render(poses)), poses
-        views, kept = training_views(self.chain, course.renderer, poses)
+        course = self[seed]
+        poses = training_poses(course.route, spacing, learning_walk=learning_walk, field=course.renderer.world.field)
+        if self.task.chain is None:
+            return self.task.encoded(course.renderer.render(poses)), poses
+        views, kept = training_views(self.task.chain, course.renderer, poses)
         return views.numpy(), kept
 
 
-class Walk:
-    """One learner's way along a route."""
+class Episode:
+    """One walk of a learner along a route."""
 
-    def __init__(self, task: RouteTask):
-        self.task, self.seed = task, task.world_seed
-        self.reason: str | None = "not begun"
+    def __init__(self, courses: Courses):
+        self.courses, self.task = courses, courses.task
+        self.seed, self._walk = self.task.world_seed, None
+
+    @property
+    def pose(self) -> Pose:
+        """Where the learner is."""
+        assert self._walk is not None
+        return self._walk.agents[0].pose
 
     def begin(self, random: np.random.Generator, options: Mapping[str, Any] | None) -> dict[str, Any]:
-        """Set out, and return the info of the first look. What `options` leave open is drawn, and then the noise of the walk.
+        """Start an episode, and return its info. What `options` leave open is drawn first, and then the noise of the walk.
 
-        options: world: the seed of one of the task's worlds. start: x (m), y (m), heading (rad).
-        Raises InputError for others, and where the walk would be over before it has begun.
+        Args:
+            random: What is drawn from.
+            options: world: the seed of one of the task's worlds; start: x (m), y (m), heading (rad).
+
+        Raises:
+            SettingError: For other options, and where the walk would be over before it has begun.
         """
         task, options = self.task, dict(options or {})
         seed, start = options.pop("world", None), options.pop("start", None)
         if options:
-            raise InputError(f"unknown option {next(iter(options))!r}; known: world, start")
+            raise SettingError(f"unknown option {next(iter(options))!r}; known: world, start")
         seeds = range(task.world_seed, task.world_seed + task.worlds)
         if seed is None:
             seed = seeds[int(random.integers(len(seeds)))]
         elif not isinstance(seed, Integral) or seed not in seeds:
-            raise InputError(f"world {seed!r}; give a seed from {seeds[0]} to {seeds[-1]}, or ask for more worlds")
-        rules = task.course(int(seed)).rules
+            raise SettingError(f"world {seed!r}; give a seed from {seeds[0]} to {seeds[-1]}, or ask for more worlds")
+        course = self.courses[int(seed)]
         if start is None:
-            pose = rules.route.start.moved(0.0, random.uniform(-task.offset, task.offset))
+            pose = course.route.start.moved(0.0, random.uniform(-task.offset, task.offset))
         else:
-            pose = Pose(*_numbers("start", start, 3, "x (m), y (m) and heading (rad)"))
-        rules.check_inside(pose)
-        self.seed, self.rules, self.pose, self.index, self.progress = int(seed), rules, pose, 0, Progress(rules)
-        self.random = random
-        info = self._look()
-        if self.reason is not None:
-            raise InputError(f"a walk that starts at {tuple(self.pose)} is {self.reason} at once; choose another start")
-        return info
+            pose = Pose(*as_numbers("start", start, 3, "x (m), y (m) and heading (rad)"))
+        walk = Walk(
+            renderer=course.renderer,
+            encoding=task.experiment.encoding,
+            route=course.route,
+            starts=[pose],
+            body=task.experiment.body,
+            stopping=task.experiment.stopping,
+            noise=[random],
+        )
+        if (reason := walk.agents[0].reason) is not None:
+            raise SettingError(f"a walk that starts at {tuple(pose)} is {reason} at once; choose another start")
+        self.seed, self._walk = int(seed), walk
+        return self._info()
 
     def check(self, action: Any) -> tuple[float, float]:
-        """The turn and step of an action. Raises InputError for what is none, and where the walk is over."""
-        if self.reason is not None:
-            raise InputError(f"this walk is {self.reason}; reset the environment to begin another one")
+        """The turn and step of an action. Raises SettingError for an invalid one, and where the episode is over."""
+        reason = "not begun" if self._walk is None else self._walk.agents[0].reason
+        if reason is not None:
+            raise SettingError(f"this walk is {reason}; reset the environment to begin another one")
         wanted = "a turn from -1 to 1 and a step from 0 to 1"
-        turn, share = _numbers("action", action, 2, wanted)
+        turn, share = as_numbers("action", action, 2, wanted)
         if not (-1 <= turn <= 1 and 0 <= share <= 1):
-            raise InputError(f"action {[turn, share]}; give {wanted}")
+            raise SettingError(f"action {[turn, share]}; give {wanted}")
         return turn, share
 
     def step(self, action: Any) -> Outcome:
-        """Turn and step: action (2,) is the turn to the left, as a share of half a turn, -1 to 1, and the step's, 0 to 1."""
+        """Turn and step.
+
+        Args:
+            action: (2,) The turn to the left as a share of half a turn, -1 to 1, and the step as a share of the longest, 0 to 1.
+        """
         turn, share = self.check(action)
-        turn *= np.pi
-        if self.task.heading_noise:
-            turn += self.task.heading_noise * self.random.standard_normal()
-        self.pose = self.pose.turned(turn).moved(share * self.rules.step_length)
-        self.progress.step(share)
-        self.index += 1
-        before = self.along
-        info = self._look()
-        reward = self.along - before + ARRIVAL * info["is_success"]
-        return reward, self.reason not in (None, OUT_OF_STEPS), self.reason == OUT_OF_STEPS, info
+        assert self._walk is not None
+        agent = self._walk.agents[0]
+        before = agent.along
+        self._walk.move(Motion(turn=np.array([turn * np.pi]), step=np.array([share])))
+        reward = agent.along - before + ARRIVAL_REWARD * (agent.reason is StopReason.ARRIVED)
+        out_of_steps = agent.reason is StopReason.OUT_OF_STEPS
+        return reward, agent.reason is not None and not out_of_steps, out_of_steps, self._info()
 
-    def _look(self) -> dict[str, Any]:
-        """Find out where it has come to."""
-        (deviation,), (along,) = self.rules.route.nearest(np.array([self.pose[:2]]))
-        self.along = float(along)
-        self.reason = self.progress.look(self.index, self.pose, float(deviation), self.along)
+    def _info(self) -> dict[str, Any]:
+        assert self._walk is not None
+        agent = self._walk.agents[0]
         return {
-            "pose": np.array(self.pose), "deviation_m": float(deviation), "along_m": self.along, "world": self.seed,
-            "reason": self.reason, "is_success": self.reason == ARRIVED,
-        }  # fmt: skip
+            "pose": np.array(agent.pose),
+            "deviation_m": agent.deviation,
+            "along_m": agent.along,
+            "world": self.seed,
+            "reason": agent.reason and agent.reason.value,
+            "is_success": agent.reason is StopReason.ARRIVED,
+        }
 
 
-def _numbers(what: str, given: Any, count: int, wanted: str) -> list[float]:
-    """What is given, as so many numbers. Raises InputError."""
+def as_numbers(name: str, given: Any, count: int, wanted: str) -> list[float]:
+    """What is given, as `count` numbers. Raises SettingError."""
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{what}: {error}; give {wanted}") from error
+        raise SettingError(f"{name}: {error}; give {wanted}") from error
     if values.shape != (count,):
-        raise InputError(f"{what} {values.tolist()}; give {wanted}")
+        raise SettingError(f"{name} {values.tolist()}; give {wanted}")
     return values.tolist()

@@ -14,7 +14,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from tussock.world.atomic import replacing
-from tussock.world.errors import InputError
+from tussock.world.errors import DiskFullError, FileError
 
 FINISHED, TABLE, LOCK = "finished.sqlite", "runs.parquet", ".lock"
 _COLUMNS = ("key", "settings", "row", "steps", "again")
@@ -23,9 +23,14 @@ TIMES = ("seconds", "learn_seconds")  # columns of the table that no two sweeps 
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """A run to be kept. key: of all that decides it. settings: as its row has them. steps: its trajectory as CSV.
+    """A run to be kept.
 
-    again: it could not be done now, and is to be tried again another time.
+    Attributes:
+        key: Of everything that decides it.
+        settings: As its row has them.
+        row: Of the table.
+        steps: Its trajectory as CSV.
+        again: It could not be done now, and is to be tried again another time.
     """
 
     key: str
@@ -47,7 +52,7 @@ class Store:
         path = folder / FINISHED
         if read_only:
             if not path.is_file():
-                raise InputError(
+                raise FileError(
                     f"{folder} holds no sweep ({FINISHED} is not there); give the folder that tussock sweep wrote"
                 )
         else:
@@ -67,12 +72,21 @@ class Store:
             self.close()
             raise _unusable(path, error) from error
 
+    def check_settings(self, names: Iterable[str]) -> None:
+        """Refuse to add to runs that have other settings than these: another version did them. Raises FileError."""
+        for (settings,) in self._read("SELECT settings FROM runs LIMIT 1"):
+            if set(json.loads(settings)) != set(names):
+                raise FileError(
+                    f"{self.folder} holds runs of another version of tussock, which do not compare; give another --out "
+                    "(tussock report still reads them)"
+                )
+
     def finished(self) -> set[str]:
         """The keys of the runs that are finished, without those to be tried again."""
         return {key for (key,) in self._read("SELECT key FROM runs WHERE NOT again")}
 
     def add(self, runs: Iterable[Finished]) -> None:
-        """Keep finished runs: all of them, or, where that fails, none. Raises InputError."""
+        """Keep finished runs: all of them, or, where that fails, none. Raises FileError."""
         try:
             with self._database:
                 self._database.executemany(
@@ -101,7 +115,7 @@ class Store:
         return zlib.decompress(packed).decode()
 
     def _read(self, query: str, *values: str) -> list[tuple]:
-        """What the database answers. Raises InputError where it is damaged."""
+        """What the database answers. Raises FileError where it is damaged."""
         try:
             return self._database.execute(query, values).fetchall()
         except sqlite3.Error as error:
@@ -122,25 +136,25 @@ class Store:
 
 
 def _locked(folder: Path) -> FileLock:
-    """Make the folder, for one sweep alone. Raises InputError where another one writes there."""
+    """Make the folder, for one sweep alone. Raises FileError where another one writes there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / LOCK, timeout=0)
         lock.acquire()
     except Timeout:
-        raise InputError(f"another sweep is writing to {folder}; wait for it, or give another --out") from None
+        raise FileError(f"another sweep is writing to {folder}; wait for it, or give another --out") from None
     except OSError as error:
-        raise InputError(f"{folder} cannot be written ({error.strerror}); give another --out") from error
+        raise FileError(f"{folder} cannot be written ({error.strerror}); give another --out") from error
     return lock
 
 
-def _unusable(path: Path, error: sqlite3.Error) -> InputError:
+def _unusable(path: Path, error: sqlite3.Error) -> FileError:
     """What went wrong with the database, as people can mend it."""
     if "full" in str(error):
-        return InputError(
+        return DiskFullError(
             f"{path}: no space is left; all runs kept before are intact: make room and give the same command again"
         )
-    return InputError(f"{path} cannot be used ({error}); is it a file of tussock sweep's?")
+    return FileError(f"{path} cannot be used ({error}); is it a file of tussock sweep's?")
 
 
 def table_of(rows: dict[str, dict[str, Any]]) -> pd.DataFrame:

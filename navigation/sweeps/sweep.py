@@ -1,6 +1,5 @@
-"""Doing a sweep: on the cores of this machine or on any running Dask cluster, and going on where an earlier one stopped."""
+"""Running a sweep: on the cores of this machine or on any Dask cluster, and going on where an earlier one stopped."""
 
-import dataclasses
 import json
 import logging
 import shutil
@@ -14,16 +13,18 @@ from distributed import CancelledError, Client, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, InputError, MissingDependencyError
+from tussock.world.progress import Progress, no_progress
 
-from ..cli.models import RunCommand
-from ..cli.options import words_of
-from ..cli.run_options import RunOptions
-from ..cli.terminal import say
+from ..experiment import Experiment
+from ..experiment_settings import TYPES, key_of, path_key, run_command, settings_of, training_key
+from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
 from .store import Finished, Store, table_of, write_table
-from .work import Walked, lesson_key, open_path, path_key, run_key, settings_of, teach, walk
+from .work import Walked, learn, open_path, walk
+
+log = logging.getLogger(__name__)
 
 WORST = "worst"  # folder of the recordings
 SECONDS = 10.0  # to wait for a scheduler
@@ -31,29 +32,34 @@ SECONDS = 10.0  # to wait for a scheduler
 
 def run_sweep(
     sweep: Sweep, out: Path, *, scheduler: str | None = None, workers: int | None = None,
-    progress: Callable[[int, int], object] = lambda done, total: None,
+    progress: Progress = no_progress,
 ) -> dict[str, Any]:  # fmt: skip
     """Do the runs of a sweep that the folder does not hold yet, keeping each as soon as it is finished.
 
-    scheduler: address of a running Dask scheduler; None starts `workers` processes here (None: one a core). Returns what
-    `tussock sweep` says. Raises InputError where another sweep writes to the folder, and where runs could not be finished: all others
-    are kept.
+    Args:
+        sweep: What is asked for.
+        out: The folder.
+        scheduler: Address of a running Dask scheduler; None starts workers on this machine, for this sweep alone.
+        workers: How many of these; None means one for each core.
+        progress: Called with how many runs are finished, of how many.
+
+    Returns:
+        What `tussock sweep --json` prints.
+
+    Raises:
+        InputError: Where another sweep writes to the folder, and where runs could not be finished; all others are kept.
     """
     began = time.perf_counter()
-    runs = {run_key(run): run for run in sweep.runs()}
+    runs = {key_of(run): run for run in sweep.experiments}
     with Store(out) as store:
+        store.check_settings(TYPES)
         finished = store.finished()
         missing = {key: run for key, run in runs.items() if key not in finished}
         progress(len(runs) - len(missing), len(runs))
         try:
             if missing:
-                _do(
-                    missing,
-                    store,
-                    scheduler,
-                    workers,
-                    lambda done: progress(len(runs) - len(missing) + done, len(runs)),
-                )
+                before = len(runs) - len(missing)
+                _run(missing, store, scheduler, workers, lambda done: progress(before + done, len(runs)))
         except BaseException:
             with suppress(InputError):  # what ended the sweep matters more, a full disk above all
                 _write_table(store, out)
@@ -68,8 +74,8 @@ def run_sweep(
 
 
 def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
-    """Keep recordings of so many of the worst runs of a finished sweep; returns their folders. Raises InputError as `record_again` does."""
-    runs = {run_key(run): run for run in sweep.runs()}
+    """Keep recordings of the worst runs of a finished sweep; returns their folders. Raises InputError as `record_again` does."""
+    runs = {key_of(run): run for run in sweep.experiments}
     with Store(out) as store:
         rows = {key: row for key, row in store.rows().items() if key in runs}
         worst = worst_of(rows, count)
@@ -81,14 +87,14 @@ def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
     return [out / WORST / key for key in worst]
 
 
-def _do(
-    missing: dict[str, RunOptions],
+def _run(
+    missing: dict[str, Experiment],
     store: Store,
     scheduler: str | None,
     workers: int | None,
     progress: Callable[[int], object],
 ) -> None:
-    """Do runs on a cluster and keep what comes of them. Raises InputError for those that could not be finished."""
+    """Do runs on a cluster and keep their results. Raises InputError for those that could not be finished."""
     done, unfinished = 0, []
     with cluster(scheduler, workers) as client:
         for batch in _finished(client, missing):
@@ -106,18 +112,18 @@ def _do(
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
             f"{len(unfinished)} of {len(missing)} runs could not be finished; all others are kept, and the same command tries again. "
-            f"The first, {command_of(missing[key], key)}: {first}"
+            f"The first, {run_command(missing[key], f'run-{key}')}: {first}"
         )
 
 
-def _finished(client: Client, missing: dict[str, RunOptions]) -> Iterator[list[tuple[str, Walked | BaseException]]]:
-    """What comes of runs, as they finish: what they found, or what went wrong. Raises InputError where the cluster is lost."""
+def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[tuple[str, Walked | BaseException]]]:
+    """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
     futures = {}
-    for key, run in missing.items():
-        path = client.submit(open_path, run, key=path_key(run))
-        taught = client.submit(teach, run, path, key=lesson_key(run))
-        futures[client.submit(walk, run, taught, key=f"run-{key}")] = key
-    path = taught = None  # so that workers forget worlds and models when the last run that needs them is done
+    for key, experiment in missing.items():
+        path = client.submit(open_path, experiment, key=path_key(experiment))
+        trained = client.submit(learn, experiment, path, key=training_key(experiment))
+        futures[client.submit(walk, experiment, trained, key=f"run-{key}")] = key
+    path = trained = None  # so that workers forget worlds and models when the last run that needs them is done
     waiting = as_completed(futures, loop=client.loop, raise_errors=False)
     left = len(futures)
     while left:
@@ -128,7 +134,7 @@ def _finished(client: Client, missing: dict[str, RunOptions]) -> Iterator[list[t
                 results.append((futures.pop(future), future.result() if error is None else error))
             except (CancelledError, CommClosedError) as gone:
                 yield results
-                raise InputError(
+                raise MissingDependencyError(
                     "the scheduler is gone; all runs that were finished are kept: give the same command again"
                 ) from gone
             future.release()
@@ -147,36 +153,31 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
                 preload=[work.__name__],
             )  # fmt: skip
             scheduler = stack.enter_context(local).scheduler_address
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what goes wrong is said in one line, below
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are reported in one line, below
         try:
             client = stack.enter_context(Client(scheduler, timeout=SECONDS, set_as_default=False))
         except (OSError, ValueError) as error:
-            raise InputError(
+            raise MissingDependencyError(
                 f"no Dask scheduler answers at {scheduler}; start one with: dask scheduler --host 127.0.0.1"
             ) from error
         if not client.scheduler_info()["workers"]:
-            say(f"no worker has joined yet; waiting for one: dask worker {scheduler} --nthreads 1")
+            log.info(f"no worker has joined yet; waiting for one: dask worker {scheduler} --nthreads 1")
         yield client
 
 
-def finished_run(run: RunOptions, key: str, result: Walked | InputError) -> Finished:
-    """A run as it is kept. One whose world or lesson failed is tried again another time: what it lacked may be there then."""
-    settings, command = settings_of(run), command_of(run, key)
+def finished_run(experiment: Experiment, key: str, result: Walked | InputError) -> Finished:
+    """A run as it is kept. One whose world or learning failed is tried again another time: what it lacked may be there then."""
+    settings, command = settings_of(experiment), run_command(experiment, f"run-{key}")
     if isinstance(result, InputError):
         row = settings | {"error": str(result), "command": command}
         return Finished(key=key, settings=settings, row=row, steps="", again=True)
     times = {"seconds": result.seconds, "learn_seconds": result.learn_seconds} if result.refused is None else {}
-    row = settings | result.found | {"error": result.refused, "command": command} | times
+    row = settings | result.results | {"error": result.refused, "command": command} | times
     return Finished(key=key, settings=settings, row=row, steps=result.steps)
 
 
-def command_of(run: RunOptions, key: str) -> str:
-    """The command that repeats a run alone, to the last bit."""
-    return f"tussock run {words_of(run, RunOptions)} --out run-{key}"
-
-
 def worst_of(rows: dict[str, dict[str, Any]], count: int) -> list[str]:
-    """Keys of the worst runs: those that did not arrive, then those put back most often, then those farthest off the route."""
+    """Keys of the worst runs: those that did not arrive, then those put back most often, then those with the greatest deviation."""
     walked = [key for key, row in rows.items() if row["error"] is None]
     return sorted(walked, key=lambda key: _badness(rows[key]), reverse=True)[:count]
 
@@ -185,20 +186,19 @@ def _badness(row: dict[str, Any]) -> tuple:
     return not row["arrived"], row["resets"], row["mean_deviation_m"]
 
 
-def record_again(run: RunOptions, row: dict[str, Any], out: Path) -> None:
-    """Repeat a finished run with a recording, unless there is one. Raises InputError where it went another way."""
+def record_again(experiment: Experiment, row: dict[str, Any], out: Path) -> None:
+    """Repeat a finished run with a recording, unless there is one. Raises InputError where its result differs."""
     names, summary = ("arrived", "steps", "mean_deviation_m", "resets"), out / "summary.json"
     if summary.exists():
-        found = json.loads(summary.read_text(encoding="utf-8"))
-        if all(found.get(name) == row[name] for name in names):
+        recorded = json.loads(summary.read_text(encoding="utf-8"))
+        if all(recorded.get(name) == row[name] for name in names):
             return
-    settings = {each.name: getattr(run, each.name) for each in dataclasses.fields(RunOptions)}
-    found = RunCommand(**settings, out=out, overwrite=True).run()
-    different = [name for name in names if found[name] != row[name]]
+    recorded = record_run(experiment, out, overwrite=True)
+    different = [name for name in names if recorded[name] != row[name]]
     if different:
         shutil.rmtree(out)
-        raise InputError(
-            f"{out}: repeated on this machine, the run went another way ({', '.join(different)}); its worker computes differently"
+        raise FileError(
+            f"{out}: repeated on this machine, the run had another result ({', '.join(different)}); its worker computes differently"
         )
 
 

@@ -15,7 +15,7 @@ from jaxtyping import Float, UInt8
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, SettingError
-from tussock.world.geometry import FARTHEST, Bounds
+from tussock.world.geometry import MAX_COORDINATE, Bounds
 from tussock.world.settings import number, numbers, settings, wholes
 
 from ..poses import Poses
@@ -57,8 +57,8 @@ class Grid:
         size: Number of positions along x and along y.
     """
 
-    begin: tuple[float, float] = numbers((0.0, 0.0), low=-FARTHEST, high=FARTHEST, unit="m")
-    spacing: float = number(0.2, low=MIN_SPACING, high=FARTHEST, unit="m")
+    begin: tuple[float, float] = numbers((0.0, 0.0), low=-MAX_COORDINATE, high=MAX_COORDINATE, unit="m")
+    spacing: float = number(0.2, low=MIN_SPACING, high=MAX_COORDINATE, unit="m")
     size: tuple[int, int] = wholes((51, 51))
 
     def __attrs_post_init__(self):
@@ -70,7 +70,7 @@ class Grid:
     @classmethod
     def over(cls, bounds: Bounds, spacing: float) -> "Grid":
         """The multiples of `spacing` (m) inside bounds, borders included. Raises SettingError if there are none or too many."""
-        if not (MIN_SPACING <= spacing <= FARTHEST and (np.abs(bounds) <= FARTHEST).all()):
+        if not (MIN_SPACING <= spacing <= MAX_COORDINATE and (np.abs(bounds) <= MAX_COORDINATE).all()):
             raise SettingError(
                 f"a grid of {spacing:g} m over {bounds}; give a spacing of at least {MIN_SPACING:g} m, and finite bounds"
             )

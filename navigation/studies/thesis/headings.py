@@ -7,7 +7,7 @@ import pandas as pd
 
 from tussock.world.geometry import turn_of_columns, wrap_angle
 
-from ...evaluation import BATCH, RECOVERED_DEG, errors_on
+from ...evaluation import BATCH, RECOVERED_DEG, errors_of_views
 from ...models.base import FamiliarityModel, Images
 from .material import Material
 
@@ -24,7 +24,9 @@ def headings(
     rows = material.near if rows is None else np.asarray(rows)
     poses = material.places[rows]
     about = np.full(len(rows), material.general_direction)
-    found = errors_on(model, images[rows].split(BATCH), material.route, poses, scan=np.radians(scan_deg), about=about)
+    found = errors_of_views(
+        model, images[rows].split(BATCH), material.route, poses, scan=np.radians(scan_deg), about=about
+    )
     return pd.DataFrame({
         "place": rows, "x_m": poses[:, 0], "y_m": poses[:, 1], "nearest_view": found.nearest,
         "set_heading_deg": np.degrees(material.wanted[rows]), "heading_deg": np.degrees(found.headings),

@@ -18,8 +18,8 @@ from tussock.world.errors import InputError
 from tussock.world.geometry import Route
 from tussock.world.scene import World
 
-from ...cli.options import ROUTE_SPACING
 from ...evaluation import nearest_view
+from ...training_setup import ROUTE_SPACING
 
 BESIDE = 0.5  # m; grid places farther from the route are not looked at
 NEAR = 0.2  # m; headings are recovered at the grid places this near to the route (section 4.3.1 of the thesis)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ...cli.terminal import say
+from ...cli.terminal import message as say
 from ...reports.findings import Findings, plain, read_findings, write_findings
 from . import beyond, classifier, confidence, corners, perfect_memory, visual_compass, world_and_views
 from .material import Material

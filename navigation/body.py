@@ -1,0 +1,16 @@
+"""The body that carries the eye: how far it steps, and how well it turns."""
+
+from tussock.world.settings import number, settings
+
+
+@settings
+class Body:
+    """How an agent moves.
+
+    Attributes:
+        step_length: Length of a whole step (m).
+        heading_noise: Standard deviation of the normal noise on every turn (rad).
+    """
+
+    step_length: float = number(0.05, above=0, unit="m")
+    heading_noise: float = number(0.0, low=0, unit="rad")

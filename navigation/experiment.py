@@ -1,0 +1,259 @@
+"""An experiment: everything that decides what happens when an agent learns a route and walks it.
+
+    trajectory = Experiment(world="meadow", seed=7, model="infomax", start_offset=0.1).run()
+    print(trajectory.summary())
+
+The command line, sweep files, protocols, the test bed, the Gymnasium task and scripts all build one. Defaults stand here, and in the
+settings that it consists of, and nowhere else. Importing this module is light: what does the work is loaded when it is used.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+from tussock.render.eye import Eye
+from tussock.world.errors import FileError, SettingError
+from tussock.world.progress import Progress, no_progress
+from tussock.world.settings import converted, instance_of, number, settings
+from tussock.world.specs import Spec
+
+from .body import Body
+from .stopping import StoppingRules
+from .surroundings import Surroundings
+from .training_setup import TrainingSetup
+
+if TYPE_CHECKING:
+    from tussock.render.renderer import Renderer
+    from tussock.world.geometry import Pose, Route
+    from tussock.world.scene import World
+
+    from .encoding import Encoding
+    from .failures import Diagnosis, Diagnostics
+    from .models.base import FamiliarityModel
+    from .models.files import TrainedModel
+    from .steering.navigator import Navigator
+    from .trajectory import Trajectory
+    from .walk import Step, Walk
+
+MODEL_SUFFIX = ".safetensors"  # of files of trained models
+FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
+
+
+def _encoding(value: Any, experiment: Any = None) -> Any:
+    """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
+    from .encoding import PRESETS, Encoding
+
+    if isinstance(value, Encoding):
+        return value
+    if not isinstance(value, str):
+        raise SettingError(f"encoding is {value!r}; give a preset's name, a chain or an Encoding")
+    return Encoding.named(value, resize=automatic_resize(experiment.eye) if value in PRESETS else 1.0)
+
+
+def _model(value: Any) -> Any:
+    """A model from its spec, its file or an untrained one."""
+    if isinstance(value, Path) or (isinstance(value, str) and value.endswith(MODEL_SUFFIX)):
+        if not Path(value).is_file():
+            raise FileError(f"there is no model file {value}; check the name")
+        return Path(value)
+    if isinstance(value, str):
+        from .models import model_spec
+
+        return model_spec(value)
+    return value if isinstance(value, Spec) else Spec.of(value)
+
+
+def _navigator(value: Any) -> Any:
+    """A navigator from its spec."""
+    if isinstance(value, str):
+        from .steering import NAVIGATORS
+
+        return NAVIGATORS.spec(value)
+    return value
+
+
+@settings
+class Experiment(Surroundings):
+    """Everything that decides a run, in SI units: the surroundings, and what an agent does there.
+
+    Attributes:
+        encoding: What is kept of a view; also a preset's name or a chain.
+        navigator: What steers: a spec, such as "scan".
+        model: What tells how familiar a view is: a spec, such as "infomax rate=baddeley", or a file of a trained model.
+        training: Which views are learned. A model from a file has learned already.
+        body: How the agent moves.
+        start_offset: The walk starts this far to the left of the route's start (m; negative: right).
+        stopping: When the walk ends.
+        device: Where the model learns and scans: "cpu", "cuda", or another device of torch.
+    """
+
+    encoding: "Encoding" = converted(default="edges", converter=_encoding, takes_self=True)
+    navigator: Spec = converted(default="scan", converter=_navigator)
+    model: Spec | Path = converted(default="perfect-memory", converter=_model)
+    training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
+    body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
+    start_offset: float = number(0.0, unit="m")
+    stopping: StoppingRules = instance_of(StoppingRules, attrs.Factory(StoppingRules), "StoppingRules")
+    device: str = attrs.field(default="cpu")
+
+    def __attrs_post_init__(self):
+        from .models.base import check_device
+
+        super().__attrs_post_init__()
+        check_device(self.device)
+        if isinstance(self.model, Spec):
+            self.navigator.make(model=self.make_model())  # refuses bad parameters
+
+    def make_model(self) -> "FamiliarityModel":
+        """The untrained model. Raises SettingError where it comes from a file."""
+        if isinstance(self.model, Path):
+            raise SettingError(f"{self.model} is a trained model; give a model's name")
+        return self.model.make(seed=self.seed, device=self.device)
+
+    def start(self, route: "Route") -> "Pose":
+        """Where the walk begins."""
+        return route.start.moved(0.0, self.start_offset)
+
+    def train(
+        self, renderer: "Renderer", route: "Route", progress: Progress = no_progress, *, model: Any = None
+    ) -> "Trained":
+        """Let a navigator learn the route, unless its model comes from a file.
+
+        Args:
+            renderer: Of the world, for the experiment's eye.
+            route: Through it.
+            progress: Called with how many training views are drawn, of how many.
+            model: An untrained model to take in place of the experiment's.
+        """
+        from .models.files import TrainedModel, load_model
+        from .threads import threads
+        from .training import training_views
+
+        began = time.perf_counter()
+        with threads(self.threads):
+            if model is None and isinstance(self.model, Path):
+                loaded = load_model(self.model, device=self.device)
+                self.check_matches(loaded)
+                navigator = self.navigator.make(model=loaded.model)
+                poses = loaded.poses
+            else:
+                navigator = self.navigator.make(model=self.make_model() if model is None else model)
+                wanted = self.training_poses(renderer.world, route)
+                views, poses = training_views(self.encoding, renderer, wanted, progress)
+                navigator.learn(views)
+        model = getattr(navigator, "model", None)
+        trained = model and TrainedModel(model=model, encoding=self.encoding, eye=self.eye, poses=poses)
+        return Trained(
+            renderer=renderer, route=route, navigator=navigator, model=trained, poses=poses,
+            seconds=time.perf_counter() - began,
+        )  # fmt: skip
+
+    def training_poses(self, world: "World", route: "Route"):
+        """(n, 3) Poses that views are learned at; see `tussock.navigation.training.training_poses`."""
+        from .training import training_poses
+
+        setup = self.training
+        return training_poses(
+            route, setup.spacing, every=setup.every, learning_walk=setup.learning_walk, field=world.field
+        )
+
+    def check_matches(self, trained: "TrainedModel") -> None:
+        """Refuse a trained model that learned through another eye or encoding. Raises SettingError."""
+        if trained.eye is not None and trained.eye != self.eye:
+            raise SettingError(
+                f"{self.model} learned through another eye ({trained.eye}) than this experiment's ({self.eye}); use the same"
+            )
+        if trained.encoding is not None and trained.encoding != self.encoding:
+            raise SettingError(
+                f"{self.model} learned views encoded as {str(trained.encoding)!r}, this experiment has {str(self.encoding)!r}; use the same"
+            )
+
+    def walk(self, renderer: "Renderer", route: "Route") -> "Walk":
+        """The walk of one agent along a route, to be steered by a navigator."""
+        from .walk import Walk
+
+        return Walk(
+            renderer=renderer,
+            encoding=self.encoding,
+            route=route,
+            starts=[self.start(route)],
+            body=self.body,
+            stopping=self.stopping,
+            noise=self.seed,
+        )
+
+    def steps(self, trained: "Trained") -> Iterator[tuple["Step", "Diagnosis | None"]]:
+        """Walk: each step as it is made, and what is wrong with it."""
+        from .threads import threads
+
+        with threads(self.threads):
+            for (step,) in self.walk(trained.renderer, trained.route).steps(trained.navigator):
+                assert step is not None
+                yield step, trained.diagnostics.examine(step)
+
+    @contextmanager
+    def opened(self, progress: Progress = no_progress) -> Iterator["Trained"]:
+        """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
+        from .walk import check_inside
+
+        with ExitStack() as stack:
+            world = self.open_world()
+            route = self.open_route(world)
+            check_inside(self.start(route), world.field)  # before the work begins
+            renderer = stack.enter_context(self.open_renderer(world))
+            yield self.train(renderer, route, progress)
+
+    def run(self, progress: Progress = no_progress) -> "Trajectory":
+        """Learn the route and walk it.
+
+        Args:
+            progress: Called with how many steps are made, of how many there may be.
+        """
+        from .trajectory import Trajectory
+
+        trajectory = Trajectory()
+        with self.opened() as trained:
+            limit = self.stopping.step_limit(trained.route.length, self.body.step_length)
+            for step, diagnosis in self.steps(trained):
+                trajectory.add(step, diagnosis)
+                progress(step.index, limit)
+        return trajectory
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trained:
+    """A navigator that has learned a route, where it can walk.
+
+    Attributes:
+        renderer: Of the world.
+        route: That it has learned.
+        navigator: What steers.
+        model: Its familiarity model with what it was trained on; None where the navigator has none.
+        poses: (n, 3) Where the views were learned; None where that is not known.
+        seconds: That learning took.
+    """
+
+    renderer: "Renderer"
+    route: "Route"
+    navigator: "Navigator"
+    model: "TrainedModel | None"
+    poses: Any
+    seconds: float
+
+    @cached_property
+    def diagnostics(self) -> "Diagnostics":
+        """What finds out why steps are poor."""
+        from .failures import Diagnostics
+
+        return Diagnostics(self.renderer, self.model, self.route)
+
+
+def automatic_resize(eye: Eye) -> float:
+    """The factor by which a preset encoding reduces the views of an eye."""
+    return max(1.0, eye.width / FINE_WIDTH)

@@ -1,0 +1,308 @@
+"""An experiment as flat settings: names with units and plain values, as sweep files, tables of runs and summaries hold them.
+
+    {"world": "meadow", "seed": 7, "size": "720x150", "model": "infomax", "heading_noise_deg": 10.0, ...}
+
+`experiment_of` and `settings_of` are each other's inverse. The flags of `tussock run` have the same names.
+"""
+
+import dataclasses
+import hashlib
+import json
+import math
+import shlex
+from collections.abc import Collection, Mapping
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tussock.render.eye import Eye
+from tussock.world.errors import SettingError
+
+from .body import Body
+from .experiment import MODEL_SUFFIX, Experiment, automatic_resize
+from .stopping import StoppingRules
+from .surroundings import Surroundings
+from .training_setup import TrainingSetup
+
+if TYPE_CHECKING:
+    from .encoding import Encoding
+    from .models.files import TrainedModel
+
+VERSION = 4  # of what a run does: a change that alters results raises it, and runs that were kept are done again
+
+# Types of the settings, in the order of a table's columns.
+TYPES: dict[str, Any] = {
+    "world": str, "world_seed": int | None, "seed": int, "size": str | None, "renderer": str, "samples": int | None,
+    "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
+    "route_seed": int | None, "route_length_m": float, "encoding": str | None, "resize": float | None, "blur": float,
+    "spacing_m": float, "every": int, "learning_walk_m": float, "device": str, "model": str, "threads": int | None, "step_m": float,
+    "offset_m": float, "heading_noise_deg": float, "scan_deg": float | None, "scan_about_deg": float | None, "on_lost": str,
+    "waypoint_m": float, "arrive_m": float, "lost_m": float, "patience_m": float, "max_steps": int | None, "navigator": str,
+}  # fmt: skip
+OF_PATH = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m")  # decide world and route
+OF_WALK = (  # decide the walk alone, not what is learned before
+    "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
+)  # fmt: skip
+
+
+def experiment_of(settings: Mapping[str, Any], models: "dict[Path, TrainedModel] | None" = None) -> Experiment:
+    """The experiment that settings describe; those that are left out are as by default.
+
+    Args:
+        settings: Values by the names of TYPES.
+        models: Trained models by their files; those that are read are added, so that many experiments read a file once.
+
+    Raises:
+        InputError: For an unknown name, and for what an experiment refuses.
+    """
+    given = _given(settings)
+    trained = _trained(given, {} if models is None else models)
+    surroundings = _surroundings(given, trained.eye if trained is not None else None)
+    names = {"start_offset": "offset_m", "model": "model", "device": "device"}
+    return Experiment(
+        **surroundings,
+        **{field: given[name] for field, name in names.items() if name in given},
+        encoding=_encoding(given, surroundings["eye"], trained),
+        navigator=_navigator(given),
+        training=TrainingSetup(**_values(given, spacing="spacing_m", every="every", learning_walk="learning_walk_m")),
+        body=Body(**_values(given, step_length="step_m", heading_noise="heading_noise_deg")),
+        stopping=_stopping(given),
+    )
+
+
+def surroundings_of(settings: Mapping[str, Any]) -> Surroundings:
+    """The surroundings that settings describe: the world, the route and the eye of `experiment_of`, and nothing else."""
+    return Surroundings(**_surroundings(_given(settings), None))
+
+
+def encoding_of(settings: Mapping[str, Any]) -> "Encoding":
+    """The encoding that settings describe."""
+    given = _given(settings)
+    return _encoding(given, _eye(given, None), None)
+
+
+def settings_of(experiment: Experiment) -> dict[str, Any]:
+    """The settings that describe an experiment, by the names of TYPES; those that follow from others are None."""
+    eye, training, body, stopping = experiment.eye, experiment.training, experiment.body, experiment.stopping
+    encoding, resize, blur = describe_encoding(experiment.encoding, eye)
+    navigator, parameters = experiment.navigator, dict(experiment.navigator.parameters)
+    scans = navigator.name == "scan"
+    width, about = (parameters.pop("width", math.pi), parameters.pop("about", None)) if scans else (None, None)
+    return {
+        "world": str(experiment.world) if isinstance(experiment.world, str | Path) else "a world in memory",
+        "world_seed": experiment.world_seed,
+        "seed": experiment.seed,
+        "size": f"{eye.width}x{eye.height}",
+        "renderer": experiment.renderer,
+        "samples": eye.samples,
+        "eye_height_m": eye.z,
+        "top_deg": degrees(eye.top),
+        "bottom_deg": degrees(eye.bottom),
+        "cull_back_faces": experiment.cull_back_faces,
+        "route": None if experiment.route is None else str(experiment.route),
+        "route_seed": experiment.route_seed,
+        "route_length_m": experiment.route_length,
+        "encoding": encoding,
+        "resize": resize,
+        "blur": blur,
+        "spacing_m": training.spacing,
+        "every": training.every,
+        "learning_walk_m": training.learning_walk,
+        "device": experiment.device,
+        "model": str(experiment.model),
+        "threads": experiment.threads,
+        "step_m": body.step_length,
+        "offset_m": experiment.start_offset,
+        "heading_noise_deg": degrees(body.heading_noise),
+        "scan_deg": None if width is None else degrees(width),
+        "scan_about_deg": None if about is None else degrees(about),
+        "on_lost": "reset" if stopping.put_back else "stop",
+        "waypoint_m": stopping.waypoint_spacing,
+        "arrive_m": stopping.arrival_radius,
+        "lost_m": stopping.max_deviation,
+        "patience_m": stopping.patience,
+        "max_steps": stopping.max_steps,
+        "navigator": str(dataclasses.replace(navigator, parameters=parameters)),
+    }
+
+
+@cache
+def default_settings() -> dict[str, Any]:
+    """The settings of an experiment that is as by default in everything."""
+    return settings_of(Experiment())
+
+
+def run_command(experiment: Experiment, out: str) -> str:
+    """The command that does the run of an experiment alone, to the last bit."""
+    defaults, words = default_settings(), []
+    for name, value in settings_of(experiment).items():
+        if value != defaults[name]:
+            flag = f"--{name.replace('_', '-')}"
+            words += [flag] if value is True else [flag, str(value)]
+    return f"tussock run {shlex.join(words)} --out {shlex.quote(out)}"
+
+
+def key_of(experiment: Experiment) -> str:
+    """A digest of everything that decides a run, the contents of its files included."""
+    return _digest(experiment, TYPES)
+
+
+def path_key(experiment: Experiment) -> str:
+    """The same, of its world and route."""
+    return "path-" + _digest(experiment, OF_PATH)
+
+
+def training_key(experiment: Experiment) -> str:
+    """The same, of what is learned before the walk."""
+    return "training-" + _digest(experiment, [name for name in TYPES if name not in OF_WALK])
+
+
+def degrees(angle: float) -> float:
+    """An angle (rad) in degrees, without the rounding of the way there and back."""
+    return round(math.degrees(angle), 9)
+
+
+def describe_encoding(encoding: "Encoding", eye: Eye) -> tuple[str, float | None, float]:
+    """An encoding in short: a preset's name, its resize (None: automatic) and blur; else the whole chain."""
+    from .encoding import PRESETS, Encoding
+    from .encoding_steps import Blur, Resize
+
+    blur = next((step.sigma for step in encoding.steps if isinstance(step, Blur)), 0.0)
+    resize = next((step.factor for step in encoding.steps if isinstance(step, Resize)), 1.0)
+    for name in PRESETS:
+        if Encoding.named(name, resize=resize, blur=blur) == encoding:
+            return name, None if resize == automatic_resize(eye) else resize, blur
+    return str(encoding), None, 0.0
+
+
+def _values(given: Mapping[str, Any], **names: str) -> dict[str, Any]:
+    """Those settings that are given, by the names of the fields that they are for; angles in radians."""
+    return {
+        field: math.radians(given[name]) if name.endswith("_deg") else given[name]
+        for field, name in names.items()
+        if name in given
+    }
+
+
+def _trained(given: Mapping[str, Any], models: "dict[Path, TrainedModel]") -> "TrainedModel | None":
+    """The trained model that a setting names, if it does."""
+    from .models.files import load_model
+
+    name = str(given.get("model", ""))
+    if not name.endswith(MODEL_SUFFIX):
+        return None
+    path = Path(name)
+    if path not in models:
+        models[path] = load_model(path, device=given.get("device", "cpu"))
+    return models[path]
+
+
+def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings that are not left out. Raises SettingError for an unknown name."""
+    if unknown := [name for name in settings if name not in TYPES]:
+        raise SettingError(f"{unknown[0]!r} is not a setting of a run; see tussock run --help")
+    return {name: value for name, value in settings.items() if value is not None}
+
+
+def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]:
+    """The fields of `Surroundings`. known: the eye that a model was trained with."""
+    names = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
+    fields = {name: given[name] for name in names if name in given}
+    return fields | _values(given, route_length="route_length_m") | {"eye": _eye(given, known)}
+
+
+def _eye(given: Mapping[str, Any], known: Eye | None) -> Eye:
+    size = given.get("size") or (f"{known.width}x{known.height}" if known is not None else None)
+    pixels = {} if size is None else dict(zip(("width", "height"), width_and_height(size), strict=True))
+    eye = Eye(**pixels, **_values(given, samples="samples", z="eye_height_m", top="top_deg", bottom="bottom_deg"))
+    if known is not None and eye != known:
+        raise SettingError(
+            f"{given['model']} learned through another eye ({known}) than is asked for ({eye}); "
+            "give the same --size, --samples, --eye-height-m, --top-deg and --bottom-deg, or none"
+        )
+    return eye
+
+
+def width_and_height(size: str) -> tuple[int, int]:
+    """Columns and rows from a text such as 720x150. Raises SettingError."""
+    width, cross, height = size.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise SettingError(f"size {size!r}: give columns x rows, for example 720x150")
+    return int(width), int(height)
+
+
+def _encoding(given: Mapping[str, Any], eye: Eye, trained: "TrainedModel | None") -> "Encoding":
+    from .encoding import PRESETS, Encoding
+
+    known = trained.encoding if trained is not None else None
+    said = [name for name in ("encoding", "resize", "blur") if given.get(name)]
+    if known is not None and not said:
+        return known
+    name = given.get("encoding", "edges")
+    automatic = automatic_resize(eye) if name in PRESETS else 1.0
+    encoding = Encoding.named(name, resize=given.get("resize", automatic), blur=given.get("blur", 0.0))
+    if known is not None and encoding != known:
+        raise SettingError(
+            f"{given['model']} learned views encoded as {str(known)!r}, these settings ask for {str(encoding)!r}; leave out "
+            f"{', '.join('--' + each for each in said)}"
+        )
+    return encoding
+
+
+def _navigator(given: Mapping[str, Any]) -> Any:
+    from .steering import NAVIGATORS
+
+    spec = NAVIGATORS.spec(given.get("navigator", "scan"))
+    scan = _values(given, width="scan_deg", about="scan_about_deg")
+    if scan and spec.name != "scan":
+        raise SettingError(
+            f"--scan-deg and --scan-about-deg are for the navigator scan; leave them out with {spec.name!r}"
+        )
+    if twice := scan.keys() & spec.parameters.keys():
+        raise SettingError(
+            f"the navigator's {', '.join(sorted(twice))} is also given by --scan-deg or --scan-about-deg; give it once"
+        )
+    if scan.get("width") == math.pi:  # as by default
+        del scan["width"]
+    return dataclasses.replace(spec, parameters={**spec.parameters, **scan})
+
+
+def _stopping(given: Mapping[str, Any]) -> StoppingRules:
+    on_lost = given.get("on_lost", "stop")
+    if on_lost not in ("stop", "reset"):
+        raise SettingError(f"--on-lost {on_lost!r}: give stop or reset")
+    rules = _values(
+        given, arrival_radius="arrive_m", max_deviation="lost_m", patience="patience_m", waypoint_spacing="waypoint_m"
+    )
+    return StoppingRules(**rules, max_steps=given.get("max_steps"), put_back=on_lost == "reset")
+
+
+def _digest(experiment: Experiment, names: Collection[str]) -> str:
+    from tussock.world.params import is_generated
+
+    settings = settings_of(experiment)
+    kept: dict[str, Any] = {name: settings[name] for name in sorted(names)}
+    kept |= {name: experiment.seed if kept[name] is None else kept[name] for name in ("world_seed", "route_seed")}
+    kept["encoding"] = str(experiment.encoding) if "encoding" in names else None
+    if experiment.route is not None:
+        kept |= {"route": _content(experiment.route), "route_seed": None, "route_length_m": None}
+    if not (isinstance(experiment.world, str) and is_generated(experiment.world)):
+        kept |= {"world": _content(experiment.world), "world_seed": None}
+    if "model" in names and isinstance(experiment.model, Path):
+        kept["model"] = _content(experiment.model)
+    return hashlib.sha256(json.dumps([VERSION, kept], default=str).encode()).hexdigest()[:16]
+
+
+def _content(source: Any) -> str:
+    """Digest of a file, or of an object in memory."""
+    if not isinstance(source, str | Path):
+        import joblib
+
+        return str(joblib.hash(source))
+    status = Path(source).stat()
+    return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=1024)  # every run of a sweep names the same few files
+def _file_digest(path: Path, size: int, changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
