@@ -571,7 +571,7 @@ BAD_FLAGS = {
     "a corner outside": (["grid", *SMALL, "--out", "d", "--to-m", "9,9"], "--to-m 9,9: that is outside the world"),
     "a corner that is not X,Y": (["grid", *SMALL, "--out", "d", "--from-m", "1"], "give X,Y"),
     "a spacing over the route": (["route", *SMALL, "--out", "d", "--spacing-m", "99"], "does not fit a route"),
-    "a missing route": (["route", *SMALL, "--out", "d", "--route", "r.csv"], r"no route file r\.csv"),
+    "a missing route": (["route", *SMALL, "--out", "d", "--route", "r.csv"], r"there is no route r\.csv"),
     "a file for a folder": (["grid", *SMALL, "--out", "file"], "file exists already"),
     "nothing to check": (["check", "nowhere"], "there is no nowhere/database_entries.csv"),
 }
