@@ -19,7 +19,7 @@ from .models import CompareCommand, EvaluateCommand, ModelsCommand, PlayCommand,
 from .protocols import REPLICATIONS
 from .studies import StudyCommand, ThesisCommand
 from .sweeps import ReportCommand, SweepCommand
-from .terminal import say, show
+from .terminal import library_messages, say, show
 from .worlds import RouteCommand, ViewCommand, WorldCommand
 
 # A command by its name, or a sentence and the commands that go under one name.
@@ -61,11 +61,12 @@ def main(arguments: list[str] | None = None) -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
     try:
         if command.json:
-            with standard_output_as_error():
+            with library_messages(), standard_output_as_error():
                 result = command.run()
             print(json.dumps(result), flush=True)
         else:
-            result = command.run()
+            with library_messages():
+                result = command.run()
             show(result)
         if result.get("ok") is False:  # what was to be checked is not as it should be
             sys.exit(1)

@@ -1,5 +1,6 @@
 """What people see of a command while it works: messages, progress, results."""
 
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -11,6 +12,24 @@ from typing import Any
 def say(text: str) -> None:
     """Tell the person something that is not the result."""
     print(text, file=sys.stderr)
+
+
+@contextmanager
+def library_messages() -> Iterator[None]:
+    """Show what the library logs, in lines on standard error, while the block runs."""
+
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            say(self.format(record))
+
+    logger, handler, level = logging.getLogger("tussock"), Handler(logging.INFO), logging.getLogger("tussock").level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
 
 
 @contextmanager
