@@ -16,7 +16,7 @@ from tussock.world.errors import InputError
 from .benchmark import BenchmarkCommand
 from .databases import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
 from .models import CompareCommand, EvaluateCommand, ModelsCommand, PlayCommand, RunCommand, TrainCommand
-from .protocols import REPLICATIONS
+from .protocols import protocol_commands
 from .studies import StudyCommand, ThesisCommand
 from .sweeps import ReportCommand, SweepCommand
 from .terminal import library_messages, say, show
@@ -37,8 +37,8 @@ COMMANDS: dict[str, Any] = {
     "report": ReportCommand,
     "benchmark": BenchmarkCommand,
     "replicate": (
-        "Re-run a published study and write a report to read beside it.",
-        {"thesis": ThesisCommand} | REPLICATIONS,
+        "Re-run a published study and write a report to read next to it.",
+        {"thesis": ThesisCommand},  # and the protocols: see `commands_for`
     ),
     "study": StudyCommand,
     "database": (
@@ -50,11 +50,12 @@ COMMANDS: dict[str, Any] = {
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 1 when a check finds something, 130 when interrupted."""
-    if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments == ["--version"]:
         print(f"tussock {version('tussock')}")
         return
     command = tyro.cli(
-        choice_of(COMMANDS), prog="tussock", args=arguments,
+        choice_of(commands_for(arguments)), prog="tussock", args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
         description="Insect visual route navigation: grow a world, look around in it, learn a route, walk it home.",
     )  # fmt: skip
@@ -83,6 +84,14 @@ def main(arguments: list[str] | None = None) -> None:
     except KeyboardInterrupt:
         say("tussock: interrupted")
         sys.exit(130)
+
+
+def commands_for(arguments: list[str]) -> dict[str, Any]:
+    """The commands that some arguments choose from. Protocols, which packages may add, are looked for only after `replicate`."""
+    if arguments[:1] != ["replicate"]:
+        return COMMANDS
+    sentence, fixed = COMMANDS["replicate"]
+    return COMMANDS | {"replicate": (sentence, fixed | protocol_commands(*arguments[1:2]))}
 
 
 def choice_of(commands: dict[str, Any]) -> Any:
