@@ -18,7 +18,7 @@ from tussock.world.route_files import write_route
 
 from ..cli.terminal import say
 from ..failures import Witness
-from ..reports.plots import overview
+from ..reports.maps import write_overview
 from ..trajectory import Trajectory
 from ..walk import Agent
 from .log import Recording, check_viewer, watch
@@ -131,7 +131,7 @@ def record_walk(
     summary |= {"seconds": seconds, "steps_per_second": (len(trajectory) - 1) / seconds, "recording": RECORDING}
     write_route(route, out / ROUTE)
     title = f"{summary['reason']} after {summary['steps']} steps, {summary['mean_deviation_m']:.3f} m off the route on average"
-    overview(world, out / PICTURE, route=route, walk=trajectory.xy, title=title)
+    write_overview(world, out / PICTURE, route=route, walk=trajectory.xy, title=title)
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
         partial.write_text(json.dumps(summary | {"settings": settings or {}}, indent=2, default=str) + "\n")
