@@ -8,14 +8,18 @@ writes assets/models/NAME.png; without names, for all models.
 import sys
 from pathlib import Path
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from tussock.navigation import Encoding, learn, make_model, training_poses
 from tussock.navigation.models import MODELS
-from tussock.navigation.reports.plots import familiarity_curves
+from tussock.navigation.reports.drawing import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, STYLE, save_picture
+from tussock.navigation.scan import best_turn
 from tussock.render import open_renderer
 from tussock.world import World
-from tussock.world.geometry import Pose, Route, wrap_angle
+from tussock.world.geometry import Pose, Route, turn_of_columns, wrap_angle
 from tussock.world.routes import generate_route
 
 PICTURES = Path(__file__).parents[1] / "assets" / "models"
@@ -33,6 +37,45 @@ def straight_and_corner(route: Route) -> tuple[float, float]:
     return float(along[change.argmin()]), float(along[change.argmax()])
 
 
+def draw(path: Path, scans: list[tuple[str, np.ndarray, float]], title: str) -> None:
+    """Write a picture of one model's familiarity at every heading, one panel per position.
+
+    Args:
+        path: File to write.
+        scans: For each position its name, the familiarity at each rotation, and the direction that the eye faces, to the left of the
+            route's heading (rad). In the picture the route's heading is 0.
+        title: Text before the positions' names.
+    """
+    with matplotlib.rc_context(STYLE | {"font.size": 11, "axes.titlesize": 11}):
+        figure = Figure(figsize=(8, 2.3), layout="constrained")
+        panels = figure.subplots(1, len(scans), sharey=True, squeeze=False)[0]
+        for axes, (position, familiarity, facing) in zip(panels, scans, strict=True):
+            draw_familiarity(axes, familiarity, facing)
+            axes.set_title(f"{title} {position}")
+        panels[0].set_ylabel("familiarity")
+        figure.supxlabel("degrees to the left of the route's heading (negative: to the right)", fontsize=11)
+        figure.get_layout_engine().set(wspace=0.06)
+        save_picture(figure, path)
+
+
+def draw_familiarity(axes: Axes, familiarity: np.ndarray, facing: float) -> None:
+    """Draw the familiarity of each rotation, the route's heading as a line and the most familiar heading as a dot."""
+    width = len(familiarity)
+    headings = np.degrees(wrap_angle(facing + turn_of_columns(np.arange(width), width)))
+    order = headings.argsort()
+    x, y = headings[order], familiarity[order]
+    axes.plot(np.r_[x[-1] - 360, x, x[0] + 360], np.r_[y[-1], y, y[0]], color=CURVE_COLOUR, lw=1.4)
+    error = float(np.degrees(wrap_angle(facing + best_turn(familiarity[None])[0])))
+    axes.axvline(0, color=ROUTE_COLOUR, lw=1)
+    axes.plot(error, y.max(), "o", color=PATH_COLOUR, ms=7, mec="white", zorder=3)
+    label = f"{abs(error):.0f} degree{'' if round(abs(error)) == 1 else 's'} off"
+    corner, align = (0.02, "left") if error > 45 else (0.99, "right")  # away from the dot
+    axes.text(corner, 1, label, color=PATH_COLOUR, ha=align, va="top", transform=axes.transAxes)
+    axes.set(xlim=(-180, 180), xticks=range(-180, 181, 90))
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(y=0.2)
+
+
 def main(names: list[str]) -> None:
     world = World.generate("tussock-field", seed=7)
     route = generate_route(world, seed=7)
@@ -45,8 +88,8 @@ def main(names: list[str]) -> None:
             model = make_model(name)
             learn(model, encoding, renderer, training_poses(route.resampled(0.04)))
             straight, corner = model.scan(seen).numpy()
-            places = [("on a straight", straight, FACING), ("at a corner", corner, FACING)]
-            familiarity_curves(PICTURES / f"{name}.png", places, title=name)
+            positions = [("on a straight", straight, FACING), ("at a corner", corner, FACING)]
+            draw(PICTURES / f"{name}.png", positions, title=name)
             print(PICTURES / f"{name}.png")
 
 

@@ -1,6 +1,7 @@
 """Published protocols: the parameters of their sweeps, their measures by hand, and one replication from the command line."""
 
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -16,16 +17,25 @@ from tussock.navigation.cli.main import main
 from tussock.navigation.cli.run_options import RunOptions
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import make_model
-from tussock.navigation.studies.protocols import ARDIN2016, AZEVEDO2025, BADDELEY2012, KAGIOULIS2024, PROTOCOLS, places
+from tussock.navigation.reports.claims import check_claims
+from tussock.navigation.studies.protocols import (
+    ARDIN2016,
+    AZEVEDO2025,
+    BADDELEY2012,
+    KAGIOULIS2024,
+    PROTOCOLS,
+    Protocol,
+    routes_in,
+)
 from tussock.navigation.studies.protocols.azevedo2025 import of_walk
-from tussock.navigation.studies.protocols.protocol import place_names
-from tussock.world.errors import InputError
+from tussock.navigation.studies.protocols.protocol import check_models, route_names
+from tussock.world.errors import SettingError
 
 TINY = ("--quick", "--world", "tiny", "--worlds", "2")
 
 
 def runs_of(protocol, quick=False):
-    return list(protocol.sweep(places(protocol.world, [], count=protocol.worlds), quick=quick).runs())
+    return list(protocol.sweep(routes_in(protocol.world, [], count=protocol.worlds), quick=quick).runs())
 
 
 def values(runs, name):
@@ -97,18 +107,26 @@ def test_kagioulis_is_as_published():
     assert "blur" in {step.word for step in runs[0].chosen_encoding().steps}
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=PROTOCOLS)
-def test_runs_can_be_done_and_quick_ones_are_fewer_of_the_same(protocol):
+@pytest.mark.parametrize("protocol", list(map(PROTOCOLS.find, PROTOCOLS.builtin)), ids=lambda protocol: protocol.name)
+def test_runs_can_be_done_and_quick_ones_are_some_of_them(protocol):
     for run in runs_of(protocol)[:: 7 * 5]:
         run.check()
     whole, quick = (runs_of(protocol, quick) for quick in (False, True))
     assert all(run in whole for run in quick)
     assert protocol.quick_worlds < protocol.worlds
-    assert len({each.name for each in protocol.exhibits}) == len(protocol.exhibits)
+    names = [item.name for item in protocol.items]
+    assert len(names) == len(set(names))
+    assert {claim.figure for claim in protocol.claims} <= set(names)
+    assert PROTOCOLS.find(protocol.name) is protocol
+
+
+def holds(protocol, results):
+    """Whether each claim of a protocol holds, by its key."""
+    return {each.claim.key: each.holds[0] for each in check_claims(protocol.claims, [results])}
 
 
 def walks(**columns):
-    """A table of walks; what is not given is alike in all."""
+    """A table of walks; columns that are not given are equal in all."""
     table = pd.DataFrame(columns)
     plain = {
         "place": "a",
@@ -126,66 +144,61 @@ ARDIN_MODELS = ["perfect-memory", "mushroom-body", "infomax", "random"]
 
 
 def test_ardin_by_hand():
-    found = ARDIN2016.measures(walks(
+    results = ARDIN2016.measure(walks(
         model=np.repeat(ARDIN_MODELS, 4), offset_m=[0.05, -0.05, 0.25, -0.25] * 4,
         resets=[0, 1, 1, 2, 1, 1, 2, 2, 3, 4, 5, 6, 20, 22, 24, 30], place=["a", "b"] * 8,
     ))  # fmt: skip
-    table = found.tables["by_displacement"].set_index("model")
+    table = results.tables["by_displacement"].set_index("model")
     assert list(table.columns) == ["5 cm", "25 cm", "all"]
     assert table.loc["perfect-memory"].tolist() == [0.5, 1.5, 1.0]
     assert table.loc["random"].tolist() == [21, 27, 24]
-    assert found.tables["by_route"].set_index("model").loc["infomax"].tolist() == [4, 5, 4.5]
-    claims = {claim.key: claim for claim in found.claims}
-    assert claims["body-close"].obtained == {"share of the way from perfect memory to random": pytest.approx(0.5 / 23)}
-    assert {key: claim.holds for key, claim in claims.items()} == {
-        "random-worst": True,
-        "perfect-best": True,
-        "body-close": True,
-    }
+    assert results.tables["by_route"].set_index("model").loc["infomax"].tolist() == [4, 5, 4.5]
+    *_, body_close = check_claims(ARDIN2016.claims, [results])
+    assert body_close.obtained == [{"share of the way from perfect memory to random": pytest.approx(0.5 / 23)}]
+    assert holds(ARDIN2016, results) == {"random-worst": True, "perfect-best": True, "body-close": True}
 
 
 @pytest.mark.parametrize(
-    ("resets", "holds"),
+    ("resets", "expected"),
     [
         ([1, 2, 9, 8], {"random-worst": False, "perfect-best": True, "body-close": False}),
         ([2, 1, 3, 99], {"random-worst": True, "perfect-best": False, "body-close": True}),
     ],
 )
-def test_ardins_claims_can_fail(resets, holds):
-    found = ARDIN2016.measures(walks(model=ARDIN_MODELS, resets=resets))
-    assert {claim.key: claim.holds for claim in found.claims} == holds
+def test_ardins_claims_can_fail(resets, expected):
+    assert holds(ARDIN2016, ARDIN2016.measure(walks(model=ARDIN_MODELS, resets=resets))) == expected
 
 
 def test_baddeley_by_hand():
     models = np.repeat(["perfect-memory", "infomax", "random"], 4)
-    found = BADDELEY2012.measures(
+    results = BADDELEY2012.measure(
         walks(model=models, resets=[0, 0, 0, 0, 0, 0, 4, 2, 9, 9, 9, 9], arrived=[True] * 11 + [False])
     )
-    table = found.tables["by_model"].set_index("model")
+    table = results.tables["by_model"].set_index("model")
     assert table["arrived without an error"].tolist() == [1, 0.5, 0]
     assert table["errors a walk"].tolist() == [0, 1.5, 9]
     assert table["arrived"].tolist() == [1, 1, 0.75]
     assert table["mean deviation (cm)"].tolist() == pytest.approx([10, 10, 10])
-    assert [claim.holds for claim in found.claims] == [True, False, True]
+    assert list(holds(BADDELEY2012, results).values()) == [True, False, True]
 
 
 def test_kagioulis_by_hand():
     models = ["perfect-memory"] * 2 + ["chain"] * 2
-    found = KAGIOULIS2024.measures(
+    results = KAGIOULIS2024.measure(
         walks(model=models, resets=[4, 0, 1, 2], mean_error_deg=[10.0, 20, 30, 2], place=["a", "b"] * 2)
     )
-    table = found.tables["by_model"].set_index("model")
+    table = results.tables["by_model"].set_index("model")
     assert table["mean absolute angular error (°)"].tolist() == [15, 16]
     assert table["trial-fail count"].tolist() == [2, 1.5]
-    assert [claim.holds for claim in found.claims] == [False, True]
-    assert found.tables["by_route"].set_index("place").loc["b", "failures, chain"] == 2
+    assert holds(KAGIOULIS2024, results) == {"sequence-lowers-error": False, "sequence-fails-less": True}
+    assert results.tables["by_route"].set_index("place").loc["b", "failures, chain"] == 2
 
 
 def test_azevedos_displacement_of_a_walk_by_hand():
     row = {"route_m": 10.0}
     steps = pd.DataFrame({"along_m": [0.0, 9.6, 9.8, 10.0, 10.0], "deviation_m": [4.0, 1.0, 2.0, 3.0, 99.0]})
-    found = of_walk(row, steps)  # what comes after its end does not count
-    assert found == {"displacement_m": 2.5, "last_displacement_m": 2.0}
+    results = of_walk(row, steps)  # what comes after its end does not count
+    assert results == {"displacement_m": 2.5, "last_displacement_m": 2.0}
     short = of_walk(row, steps.iloc[:1])
     assert short["displacement_m"] == 4
     assert np.isnan(short["last_displacement_m"])
@@ -205,25 +218,27 @@ def test_a_route_has_the_length_that_it_has(tmp_path):
         assert walk(run, teach(run, path)).found["route_m"] == path[1].length
 
 
-def test_routes_of_one_name_are_told_apart():
+def test_routes_with_the_same_file_name_have_different_names():
     rows = [
         {"route": route, "route_seed": 4}
         for route in ("/a/route.csv", "/b/route.csv", "/b/other.csv", None, "/a/route.csv")
     ]
-    assert place_names(rows) == ["/a/route.csv", "/b/route.csv", "other", "route 4", "/a/route.csv"]
+    assert route_names(rows) == ["/a/route.csv", "/b/route.csv", "other", "route 4", "/a/route.csv"]
 
 
 def test_azevedo_by_hand():
     table = walks(model="perfect-memory", offset_m=[-2.0, 2, -4, 4, 0]).assign(
         displacement_m=[1.0, 3, 5, 7, 0.5], last_displacement_m=[1.0, np.nan, np.nan, 4, 0.5]
     )
-    found = AZEVEDO2025.measures(table)
-    rows = found.tables["by_start"].to_numpy().tolist()
+    results = AZEVEDO2025.measure(table)
+    rows = results.tables["by_start"].to_numpy().tolist()
     assert rows == [[0, 1, 0.5, 0.5, 1], [2, 2, 2, 1, 0.5], [4, 2, 6, 4, 0.5]]
-    assert found.claims[0].holds is True
-    assert found.numbers["share that got to the last 5 %"] == 0.6
-    back = AZEVEDO2025.measures(table.assign(displacement_m=[7.0, 7, 1, 1, 9]))
-    assert back.claims[0].holds is False
+    assert holds(AZEVEDO2025, results) == {"no-approach": True}
+    assert results.numbers["share that got to the last 5 %"] == 0.6
+    back = AZEVEDO2025.measure(table.assign(displacement_m=[7.0, 7, 1, 1, 9]))
+    assert holds(AZEVEDO2025, back) == {"no-approach": False}
+    one = AZEVEDO2025.measure(table[:1])
+    assert holds(AZEVEDO2025, one) == {"no-approach": None}
 
 
 @pytest.fixture(scope="module")
@@ -244,9 +259,9 @@ def replication(tmp_path_factory) -> Path:
     ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
-    assert (said["runs"], said["done_before"], said["could_not_run"]) == (4, 0, 0)
-    assert set(said["claims"]) == {"sequence-lowers-error", "sequence-fails-less"}
+    result = json.loads(done.stdout)
+    assert (result["runs"], result["done_before"], result["could_not_run"]) == (4, 0, 0)
+    assert set(result["claims"]) == {"sequence-lowers-error", "sequence-fails-less"}
     return out
 
 
@@ -271,14 +286,14 @@ def test_the_page_is_self_contained_and_has_everything(replication):
     anchors = re.findall(r'id="([^"]+)"', page)
     assert len(anchors) == len(set(anchors))
     assert set(re.findall(r'href="#([^"]+)"', page)) <= set(anchors)
-    assert {each.name for each in KAGIOULIS2024.exhibits} <= set(anchors)
+    assert {item.name for item in KAGIOULIS2024.items} <= set(anchors)
     assert (
         page.index('id="summary"')
         < page.index('id="results"')
         < page.index('id="differences"')
         < page.index('id="again"')
     )
-    drawn = [each.name for each in KAGIOULIS2024.exhibits if each.draw]
+    drawn = [item.name for item in KAGIOULIS2024.items if item.draw]
     assert page.count("data:image/png;base64,") == len(drawn)
     files = sorted(f"{name}.{kind}" for name in drawn for kind in ("png", "svg"))
     assert sorted(path.name for path in (replication / "figures").iterdir()) == files
@@ -288,11 +303,11 @@ def test_the_page_is_self_contained_and_has_everything(replication):
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_browser_shows_the_page_without_errors(replication, tmp_path, width):
     shown = in_browser(replication / "report.html", width, tmp_path)
-    pictures = sum(each.draw is not None for each in KAGIOULIS2024.exhibits)
-    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": pictures}
+    images = sum(item.draw is not None for item in KAGIOULIS2024.items)
+    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": images}
 
 
-def test_a_second_time_does_nothing_anew_and_changes_no_byte(replication, capsys):
+def test_a_second_run_does_nothing_again_and_changes_no_byte(replication, capsys):
     names = ("report.html", "results.json", "runs.parquet")
     before = {name: (replication / name).read_bytes() for name in names}
     main(["replicate", "kagioulis2024", *TINY, "--out", str(replication), "--json"])
@@ -308,15 +323,15 @@ def test_a_report_of_something_else_is_not_replaced(replication, capsys):
 
 
 def test_given_routes_through_a_given_world():
-    chosen = places("world.bin", [Path("a.csv"), Path("b.csv")], seed=2)
+    chosen = routes_in("world.bin", [Path("a.csv"), Path("b.csv")], seed=2)
     assert [choice["route"].name for choice in chosen] == ["a.csv", "b.csv"]
-    generated = places("tiny", [], seed=2, count=3)
+    generated = routes_in("tiny", [], seed=2, count=3)
     assert [(choice["world_seed"], choice["route_seed"]) for choice in generated] == [(2, 2), (3, 3), (4, 4)]
-    assert [choice["route_seed"] for choice in places("world.bin", [], seed=2, count=2)] == [2, 3]
+    assert [choice["route_seed"] for choice in routes_in("world.bin", [], seed=2, count=2)] == [2, 3]
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("flags", "message"),
     [
         ("--route a.csv", "give --world as well"),
         ("--world tiny --route a.csv --worlds 2", "give it, or --route"),
@@ -328,17 +343,145 @@ def test_given_routes_through_a_given_world():
         ("--world 'tiny field_width=0'", "field_width"),
     ],
 )
-def test_bad_input_is_one_line(words, message, tmp_path, capsys, monkeypatch):
+def test_bad_input_is_one_line(flags, message, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as end:
-        main(["replicate", "ardin2016", *shlex.split(words)])
+        main(["replicate", "ardin2016", *shlex.split(flags)])
     assert end.value.code == 2
     assert message in capsys.readouterr().err.strip().splitlines()[-1]
     assert not (tmp_path / "ardin2016").exists()
 
 
-def test_a_model_that_never_walked_is_no_verdict():
-    from tussock.navigation.studies.protocols.protocol import check_walked
+def test_a_table_without_walks_of_a_model_is_refused():
+    with pytest.raises(SettingError, match="no walk with random"):
+        check_models(walks(model=["chain"]), ["chain", "random"])
 
-    with pytest.raises(InputError, match="no walk with random could be made"):
-        check_walked(walks(model=["chain"]), ["chain", "random"])
+
+def test_a_protocol_is_checked_when_it_is_made():
+    fields = {name: getattr(ARDIN2016, name) for name in Protocol.__annotations__}
+    for change, message in (
+        ({"worlds": 0}, "worlds is 0"),
+        ({"axes": {}}, 'no axis "model"'),
+        (
+            {"items": ARDIN2016.items[:1]},
+            "'perfect-best' is shown by 'by-model'; give one of its items: by-displacement",
+        ),
+    ):
+        with pytest.raises(SettingError, match=message):
+            Protocol(**fields | change)
+
+
+# Protocols from outside
+
+PROTOCOL = '''"""Nobody 2030: whether perfect memory arrives."""
+
+from tussock.navigation.reports.claims import Claim, Decision
+from tussock.navigation.reports.results import StudyResults
+from tussock.navigation.studies.protocols import Item, Parameter, Protocol
+
+
+def measure(walks):
+    return StudyResults(tables={"walks": walks[["model", "arrived"]]}, numbers={"arrived": walks["arrived"].mean()})
+
+
+def decide(results):
+    return Decision({"share that arrived": results.numbers["arrived"]}, results.numbers["arrived"] > 0)
+
+
+NOBODY2030 = Protocol(
+    name="nobody2030",
+    title="Arrivals",
+    paper="Nobody (2030).",
+    question="Does perfect memory arrive?",
+    settings={"size": "60x12", "route_length_m": 2.0},
+    axes={"model": [{"model": "perfect-memory"}]},
+    world="tiny",
+    worlds=3,
+    quick_worlds=1,
+    quick_axes={},
+    parameters=(Parameter("View", "unknown", "60 x 12"),),
+    differences=("Everything.",),
+    measure=measure,
+    claims=(Claim(key="arrives", statement="It arrives.", figure="walks", test="one walk arrives", decide=decide),),
+    items=(Item(name="walks", title="Walks", caption="All.", table="walks"),),
+)
+'''
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch) -> Path:
+    """A folder on Python's path with packages, and entry points: one that works, one of a missing module, one that crashes."""
+    for name, text in {
+        "antlab/__init__.py": "",
+        "antlab/protocol.py": PROTOCOL,
+        "antlab-1.dist-info/METADATA": "Metadata-Version: 2.1\nName: antlab\nVersion: 1\n",
+        "antlab-1.dist-info/entry_points.txt": "[tussock.protocols]\nnobody2030 = antlab.protocol:NOBODY2030\n"
+        "broken = antlab.gone:X\ncrashing = crashlab.protocol:X\n",
+        "crashlab/__init__.py": "raise RuntimeError\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    paths = [str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
+    return tmp_path
+
+
+def replicate(*words, folder):
+    command = [sys.executable, "-m", "tussock", "replicate", *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
+
+
+@pytest.mark.parametrize("name", ["nobody2030", "antlab.protocol:NOBODY2030"])
+def test_a_protocol_of_another_package_can_be_replicated(package, name):
+    done = replicate(name, "--quick", "--workers", "1", "--json", folder=package)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert (result["runs"], result["claims"]["arrives"]["holds"]) == (1, "holds")
+    page = (package / "nobody2030" / "report.html").read_text(encoding="utf-8")
+    assert f"tussock replicate {name} --quick --out nobody2030" in page
+
+
+def test_help_lists_every_protocol_with_its_sentence_and_imports_none(package):
+    script = (
+        "import sys\nfrom tussock.navigation.cli.main import main\n"
+        "try: main(['replicate', '--help'])\nexcept SystemExit: pass\n"
+        "print('HEAVY', {'pandas', 'torch', 'matplotlib', 'antlab.protocol'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert "HEAVY set()" in done.stdout, done.stderr
+    text = " ".join(done.stdout.replace("│", " ").split())
+    assert "nobody2030 Nobody 2030: whether perfect memory arrives." in text
+    assert (
+        "ardin2016 Ardin et al. 2016: errors along a route, by perfect memory, a mushroom body, Infomax and chance."
+        in text
+    )
+    assert "broken" in text
+    assert "crashing" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "messages"),
+    [
+        ("json:dumps", ["json:dumps", "function", "Protocol"]),
+        ("antlab.protocol:GONE", ["antlab.protocol:GONE", "cannot be imported"]),
+        ("nowhere:X", ["nowhere:X", "cannot be imported", "package.module"]),
+        ("broken", ["broken", "antlab.gone", "repair"]),
+    ],
+)
+def test_something_else_than_a_protocol_is_one_line(package, name, messages):
+    done = replicate(name, "--quick", folder=package)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert all(message in done.stderr for message in messages), done.stderr
+
+
+def test_a_protocol_that_a_script_registers_is_a_command(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(PROTOCOLS, "_registered", {})
+    PROTOCOLS.register("mine", ARDIN2016)
+    with pytest.raises(SystemExit):
+        main(["replicate", "--help"])
+    assert "How often does an agent leave a route" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as end:
+        main(["replicate", "mine", "--worlds", "0", "--out", str(tmp_path / "out")])
+    assert end.value.code == 2
+    assert "--worlds 0" in capsys.readouterr().err

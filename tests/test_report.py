@@ -1,4 +1,4 @@
-"""The replication from the command line: its report in a real browser, its numbers, and what interruptions leave."""
+"""The replication of the thesis from the command line: its report in a browser, its numbers, and interruptions."""
 
 import json
 import re
@@ -12,9 +12,9 @@ import pytest
 from browser import WIDTHS, in_browser
 
 from tussock.navigation.cli.main import main
-from tussock.navigation.studies.thesis.figures import PICTURES
-from tussock.navigation.studies.thesis.tables import LISTINGS
-from tussock.navigation.studies.thesis.thesis import STUDIES
+from tussock.navigation.studies.thesis.figures import FIGURES
+from tussock.navigation.studies.thesis.report import ITEMS
+from tussock.navigation.studies.thesis.studies import STUDIES
 
 TINY = ("--quick", "--world", "tiny", "--size", "72x15", "--spacing-m", "0.04")
 CLAIMS = {
@@ -26,9 +26,18 @@ CLAIMS = {
 }  # fmt: skip
 
 
-def tussock(*words) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "tussock", *map(str, words)]
+def tussock(*arguments) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "tussock", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True)
+
+
+def test_every_claim_is_shown_by_one_item():
+    claims = [claim for study in STUDIES.values() for claim in study.claims]
+    assert {claim.key for claim in claims} == CLAIMS
+    for claim in claims:
+        assert sum(claim.figure in item.numbers for item in ITEMS) == 1, claim.key
+    names = [item.name for item in ITEMS]
+    assert len(names) == len(set(names))
 
 
 @pytest.fixture(scope="module")
@@ -80,22 +89,22 @@ def test_the_page_is_self_contained_and_has_everything(replication):
     assert page.index('id="summary"') < page.index('id="setting"')
     anchors = set(re.findall(r'id="([^"]+)"', page))
     assert set(re.findall(r'href="#([^"]+)"', page)) <= anchors
-    for exhibit in (*PICTURES, *LISTINGS):
-        assert f": {exhibit.title}</h3>".replace("'", "&#39;") in page
+    for item in ITEMS:
+        assert f": {item.title}</h3>".replace("'", "&#39;") in page
     assert {f"claim-{key}" for key in CLAIMS} <= anchors
-    assert page.count("data:image/png;base64,") == len(PICTURES)
+    assert page.count("data:image/png;base64,") == len(FIGURES)
     figures = sorted(path.name for path in (replication / "figures").iterdir())
-    assert len(figures) == 2 * len(PICTURES)
-    assert sum(name.endswith(".svg") for name in figures) == len(PICTURES)
+    assert len(figures) == 2 * len(FIGURES)
+    assert sum(name.endswith(".svg") for name in figures) == len(FIGURES)
 
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_browser_shows_it_without_errors(replication, tmp_path, width):
     shown = in_browser(replication / "report.html", width, tmp_path)
-    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": len(PICTURES)}
+    assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": len(FIGURES)}
 
 
-def test_a_second_run_finds_everything_done_and_changes_no_number(replication):
+def test_a_second_run_does_nothing_again_and_changes_no_byte(replication):
     before = {path.name: path.read_bytes() for path in (replication / "results.json", replication / "report.html")}
     done = tussock("replicate", "thesis", *TINY, "--out", replication)
     assert done.returncode == 0
@@ -139,7 +148,7 @@ def test_one_figure_alone(replication, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (["study", "nonsense"], "unknown study 'nonsense'; give one of setting"),
         (["study", "setting", "--figure", "99", *TINY], "no figure '99' in this study; it has 4, 5"),
@@ -151,11 +160,10 @@ def test_one_figure_alone(replication, tmp_path):
         (["replicate", "thesis", "--out", __file__], "is a file"),
     ],
 )
-def test_bad_input_is_one_line(words, message, tmp_path, capsys, monkeypatch):
+def test_bad_input_is_one_line(arguments, message, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as end:
-        main(words)
+        main(arguments)
     assert end.value.code == 2
-    said = capsys.readouterr().err.strip().splitlines()[-1]
-    assert message in said
+    assert message in capsys.readouterr().err.strip().splitlines()[-1]
     assert not (tmp_path / "study" / "report.html").exists()

@@ -10,7 +10,6 @@ import sqlite3
 import subprocess
 import sys
 import time
-import tracemalloc
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -22,12 +21,12 @@ import pytest
 from browser import WIDTHS, in_browser
 
 from tussock.navigation.cli.run_options import RunOptions
-from tussock.navigation.sweeps.figures import along_axis
+from tussock.navigation.reports.report import Drawing
 from tussock.navigation.sweeps.spec import read_sweep
-from tussock.navigation.sweeps.statistics import axes_of, by_axis, mean_interval, pairings, worlds_of
-from tussock.navigation.sweeps.store import TIMES, Finished, Store, table_of
+from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
 from tussock.navigation.sweeps.sweep import finished_run, record_again
 from tussock.navigation.sweeps.work import Walked, lesson_key, options_of, path_key, run_key
+from tussock.navigation.sweeps.worst import walk_section
 from tussock.world.errors import InputError
 
 BIN = Path(sys.executable).parent
@@ -402,18 +401,6 @@ def test_a_recording_of_another_walk_does_not_stay(swept, tmp_path):
         assert not (tmp_path / "here").exists()
 
 
-def test_a_figure_has_every_choice():
-    """An axis that was added later, so that earlier runs have none; and numbers that differ in their last digits."""
-    for choices in ([None, 1.0, 2.0], [0.1, 0.1000001], [100000.1, 100000.2]):
-        rows = [
-            {"world": "tiny", "world_seed": k, "seed": k, "route": None, "route_seed": None, "resize": each, "arrived": True}
-            for each in choices for k in range(3)
-        ]  # fmt: skip
-        frame = table_of({str(k): row for k, row in enumerate(rows)})
-        assert len(by_axis(frame, ["resize"], ["arrived"])) == len(choices)
-        along_axis(frame, ["resize"], ["arrived"], [])
-
-
 def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
     rows = {
         str(k): {"seed": k % 5, "model": "ab"[k % 2], "route": None if k % 3 else "r", "error": None} for k in range(20)
@@ -422,69 +409,14 @@ def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
     assert table_of(shuffled).equals(table_of(rows))
 
 
-def test_intervals_are_those_of_the_textbook():
-    """For many independent values, mean +- 1.96 standard errors; where runs share worlds, those of the means of the worlds."""
-    random = np.random.default_rng(0)
-    values = random.normal(3, 2, 2000)
-    found = mean_interval(values, np.arange(2000))
-    assert np.allclose(
-        [found.low, found.high], 3 + np.array([-1.96, 1.96]) * 2 / 2000**0.5 + values.mean() - 3, atol=0.02
-    )
-    worlds = np.repeat(np.arange(40), 50)
-    shared = np.repeat(random.normal(size=40), 50)
-    wide = mean_interval(shared, worlds)
-    assert 0.8 < (wide.high - wide.low) / (2 * 1.96 * shared.std() / 40**0.5) < 1.2
-    assert np.isnan(mean_interval(np.array([]), np.array([], dtype=int)).value)
-    one = mean_interval(np.array([3.0]), np.array([0]))
-    assert one.value == 3
-    assert np.isnan([one.low, one.high]).all()  # nobody knows how another one would differ
-
-
-def test_runs_in_one_world_are_not_independent():
-    rows = [
-        {"world": world, "world_seed": seed, "seed": 5, "route": route, "route_seed": route_seed}
-        for world, route in (("tiny", None), ("a.glb", None), ("a.glb", "b.csv"))
-        for seed in (None, 5, 6)
-        for route_seed in (None, 1)
-    ]
-    found = worlds_of(pd.DataFrame(rows)).tolist()
-    # Of generated worlds there are two; in that of a file, two generated routes and one from a file.
-    assert found == [0, 0, 0, 0, 1, 1, 2, 3, 2, 3, 2, 3, 4, 4, 4, 4, 4, 4]
-
-
-def test_many_groups_take_little_memory():
-    tracemalloc.start()
-    mean_interval(np.ones(30_000), np.arange(30_000))
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert most < 2**27
-
-
-def test_models_are_compared_where_all_else_is_alike():
-    rows = [
-        {"model": model, "offset_m": offset, "world": "w", "world_seed": seed, "route": None, "route_seed": None, "route_length_m": 8.0,
-         "seed": 0, "arrived": model == "good" or offset == 0, "mean_deviation_m": 0.1 if model == "good" else 0.3}
-        for model in ("bad", "good") for offset in (0.0, 0.1) for seed in range(3)
-    ]  # fmt: skip
-    frame = pd.DataFrame([*rows, rows[0] | {"offset_m": 7.0}])  # this one has no partner
-    settings = ["model", "offset_m", "world", "world_seed", "seed"]
-    axes = axes_of(frame, settings)
-    assert list(axes.values()) == [["model"], ["offset_m"], ["world_seed"]]
-    (pair,) = pairings(frame, settings, ["arrived", "mean_deviation_m"], ["model"])
-    assert (pair.first, pair.second, pair.pairs) == ("bad", "good", 6)
-    assert pair.difference["arrived"].value == -0.5
-    assert np.isclose(pair.difference["mean_deviation_m"].value, 0.2)
-    assert (pair.better["arrived"], pair.worse["arrived"], pair.worse["mean_deviation_m"]) == (0, 3, 6)
-
-
-def test_the_report_of_a_sweep_stands_by_itself(swept):
+def test_the_report_of_a_sweep_has_everything(swept):
     done = subprocess.run([TUSSOCK, "report", swept, "--json"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
-    html = Path(said["report"]).read_text()
-    results = json.loads(Path(said["results"]).read_text())
-    assert said["runs"] == results["runs"] == 24
-    assert said["arrived"] == table(swept)["arrived"].mean()
+    result = json.loads(done.stdout)
+    html = Path(result["report"]).read_text()
+    results = json.loads(Path(result["results"]).read_text())
+    assert result["runs"] == results["runs"] == 24
+    assert result["arrived"] == table(swept)["arrived"].mean()
     assert set(results["by"]) == {"model", "offset (m)", "seed"}
     for choices in results["by"].values():
         assert sum(choice["runs"] for choice in choices.values()) == 24
@@ -492,9 +424,21 @@ def test_the_report_of_a_sweep_stands_by_itself(swept):
             choice["arrived"]["low"] <= choice["arrived"]["value"] <= choice["arrived"]["high"]
             for choice in choices.values()
         )
+    assert "24 runs, all completed" in html
     assert html.count("data:image/png;base64,") == 3 + 2 * 5
     assert 'src="http' not in html
     assert all(row["command"] in html for row in table(swept).to_dict("records") if row["key"] in results["worst"])
+    anchors = ["by-model", "by-offset_m", "by-seed", "pairs", "causes", "worst"]
+    assert all(f'id="{anchor}"' in html for anchor in [*anchors, *(f"walk-{key}" for key in results["worst"])])
+
+
+def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):
+    with Store(swept, read_only=True) as store:
+        key, row = next(iter(store.rows().items()))
+        section = walk_section(1, key, row | {"world": "gone.glb"}, read_steps(store.steps(key)), swept)
+    drawing = next(block for block in section.blocks if isinstance(block, Drawing))
+    with pytest.raises(InputError, match=r"gone\.glb"):
+        list(drawing.draw())
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -67,6 +67,14 @@ class Registry:
         hint = "import it first" if LOCATION.fullmatch(name) else "or package.module:Class"
         raise SettingError(f"unknown {self.kind} {name!r}; known: {', '.join(self.names)}, {hint}")
 
+    def where(self, name: str) -> str | None:
+        """The `module:attribute` that a name stands for, without importing it; None for what a script registered."""
+        if name in self.builtin:
+            return self.builtin[name]
+        if name in self._registered:
+            return None
+        return self._installed[name].value if name in self._installed else name
+
     def spec(self, text: str) -> Spec:
         """The spec that a text holds. Raises SettingError for an unknown name or parameter."""
         try:

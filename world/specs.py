@@ -4,6 +4,7 @@ Models, navigators and generated worlds are written like this on the command lin
 """
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -103,7 +104,7 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
     """The parameters that words such as `rate=0.1` give. Their values are checked where the object is made.
 
     Args:
-        words: Parameters as `name=value`.
+        words: Parameters as `name=value`; an angle may be given in degrees, as `name_deg=value`.
         name: Name of the target, for messages.
         target: Class or function whose parameters they are.
 
@@ -116,14 +117,25 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
         key, _, value = word.partition("=")
         if not (key and value):
             raise SettingError(f"{word!r} is not a parameter; give name=value, without spaces")
+        in_degrees = not _takes(target, key) and key.removesuffix("_deg") in own
+        key = key.removesuffix("_deg") if in_degrees else key
         if key in RESERVED:
             raise SettingError(f"{key} cannot be part of {name!r}; give it as --{key}, in Python as {key}=")
         if not _takes(target, key):
             raise SettingError(f"{name} has no parameter {key!r}; its parameters are {', '.join(own) or 'none'}")
         if key in parameters:
             raise SettingError(f"{key} is given twice; give it once")
-        parameters[key] = parse_value(value, own.get(key))
+        parameters[key] = _radians(word, value) if in_degrees else parse_value(value, own.get(key))
     return parameters
+
+
+def _radians(word: str, text: str) -> Any:
+    """The angle or angles (rad) of a parameter that is given in degrees. Raises SettingError for anything but numbers."""
+    value = parse_value(text, 0.0)
+    try:
+        return tuple(map(math.radians, value)) if isinstance(value, tuple) else math.radians(value)
+    except TypeError as error:
+        raise SettingError(f"{word!r} is not an angle; give a number of degrees") from error
 
 
 def parse_value(text: str, default: Any) -> Any:

@@ -1,7 +1,6 @@
 """The command line: gives flags to the commands, and prints their results."""
 
 import json
-import logging
 import os
 import signal
 import sys
@@ -17,10 +16,10 @@ from tussock.world.errors import InputError
 from .benchmark import BenchmarkCommand
 from .databases import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
 from .models import CompareCommand, EvaluateCommand, ModelsCommand, PlayCommand, RunCommand, TrainCommand
-from .protocols import REPLICATIONS
+from .protocols import protocol_commands
 from .studies import StudyCommand, ThesisCommand
 from .sweeps import ReportCommand, SweepCommand
-from .terminal import MessageHandler, message, show
+from .terminal import library_messages, message, show
 from .worlds import RouteCommand, ViewCommand, WorldCommand
 
 # A command by its name, or a sentence and the commands that go under one name.
@@ -38,8 +37,8 @@ COMMANDS: dict[str, Any] = {
     "report": ReportCommand,
     "benchmark": BenchmarkCommand,
     "replicate": (
-        "Re-run a published study and write a report to read beside it.",
-        {"thesis": ThesisCommand} | REPLICATIONS,
+        "Re-run a published study and write a report to read next to it.",
+        {"thesis": ThesisCommand},  # and the protocols: see `commands_for`
     ),
     "study": StudyCommand,
     "database": (
@@ -51,24 +50,24 @@ COMMANDS: dict[str, Any] = {
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 1 when a check finds something, 130 when interrupted."""
-    if (sys.argv[1:] if arguments is None else arguments) == ["--version"]:
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments == ["--version"]:
         print(f"tussock {version('tussock')}")
         return
     command = tyro.cli(
-        choice_of(COMMANDS), prog="tussock", args=arguments,
+        choice_of(commands_for(arguments)), prog="tussock", args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
         description="Insect visual route navigation: make a world, look around in it, learn a route, walk it home.",
     )  # fmt: skip
-    log = logging.getLogger("tussock")
-    log.handlers, log.level, log.propagate = [MessageHandler()], logging.INFO, False
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
     try:
         if command.json:
-            with standard_output_as_error():
+            with library_messages(), standard_output_as_error():
                 result = command.run()
             print(json.dumps(result), flush=True)
         else:
-            result = command.run()
+            with library_messages():
+                result = command.run()
             show(result)
         if result.get("ok") is False:  # what was to be checked is not as it should be
             sys.exit(1)
@@ -85,6 +84,14 @@ def main(arguments: list[str] | None = None) -> None:
     except KeyboardInterrupt:
         message("tussock: interrupted")
         sys.exit(130)
+
+
+def commands_for(arguments: list[str]) -> dict[str, Any]:
+    """The commands that some arguments choose from. Protocols, which packages may add, are looked for only after `replicate`."""
+    if arguments[:1] != ["replicate"]:
+        return COMMANDS
+    sentence, fixed = COMMANDS["replicate"]
+    return COMMANDS | {"replicate": (sentence, fixed | protocol_commands(*arguments[1:2]))}
 
 
 def choice_of(commands: dict[str, Any]) -> Any:

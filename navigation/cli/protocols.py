@@ -1,22 +1,23 @@
-"""The commands that re-run other published experiments. Heavy packages are imported where they are used."""
+"""The commands that re-run published experiments, one for each registered protocol. Heavy packages are imported where they are used."""
 
+import ast
 import shlex
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 
 from .options import WORLD, flags_of
 from .sweeps import check_workers
-from .terminal import message as say
-from .terminal import progress
+from .terminal import message, progress
 
 if TYPE_CHECKING:
     from ..studies.protocols import Protocol
-    from ..sweeps.spec import Choice, Sweep
+    from ..sweeps.spec import Sweep
 
 
 @dataclass
@@ -28,7 +29,7 @@ class ProtocolCommand:
     route: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
     """A route through that world; give it several times, or several with commas between them. Default: generated routes."""
     worlds: int | None = None
-    """How many generated worlds, or generated routes through a world that is given. Default: as many as in the original."""
+    """Number of generated worlds, or of generated routes through a given world. Default: that of the original."""
     seed: int = 0
     """Seed of the first generated world and route, the others follow; and of all noise and first weights."""
     cull_back_faces: bool = False
@@ -38,109 +39,121 @@ class ProtocolCommand:
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this command alone."""
     workers: int | None = None
-    """How many of these. Default: one a core."""
+    """Number of workers on this machine. Default: one per core."""
     out: Path | None = None
     """Folder for the runs and the report; runs that are finished there are not done again. Default: the protocol's name."""
     overwrite: bool = False
-    """Replace the report of something else that the folder holds."""
+    """Replace the report of something else in the folder."""
     json: bool = False
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        from ..studies.protocols import PROTOCOLS
+        from ..reports.report import check_report_folder
         from ..studies.protocols.replication import replicate
-        from ..studies.thesis.report import check_report_folder
 
-        protocol, out = PROTOCOLS[self.PROTOCOL], self.out or Path(self.PROTOCOL)
+        protocol = self.protocol()
+        out = self.out or Path(protocol.name)
         self.check()
         sweep = self.sweep(protocol)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
-        say(f"{len(sweep)} runs: {', '.join(f'{len(choices)} of {name}' for name, choices in sweep.axes.items())}")
-        given = flags_of(self, type(self), leave_out=("scheduler", "workers", "out", "overwrite", "json", "route"))
-        given = " ".join([given] * bool(given) + [shlex.join(["--route", str(route)]) for route in self.routes()])
-        command = f"tussock replicate {self.PROTOCOL}{' ' * bool(given)}{given} --out {shlex.quote(str(out))}"
+        message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
             return replicate(
-                protocol, sweep, out, about=about, command=command, scheduler=self.scheduler, workers=self.workers, progress=report
-            )  # fmt: skip
+                protocol,
+                sweep,
+                out,
+                about=about,
+                command=self.command(out),
+                scheduler=self.scheduler,
+                workers=self.workers,
+                progress=report,
+            )
+
+    def protocol(self) -> "Protocol":
+        """The protocol of this command. Raises SettingError for something else of that name."""
+        from ..studies.protocols import PROTOCOLS, Protocol
+
+        protocol = PROTOCOLS.find(self.PROTOCOL)
+        if not isinstance(protocol, Protocol):
+            raise SettingError(
+                f"{self.PROTOCOL!r} is a {type(protocol).__name__}; give the name of a Protocol (tussock.navigation.studies.protocols)"
+            )
+        return protocol
 
     def check(self) -> None:
-        """Refuse flags that make no sense, alone or together. Raises InputError."""
+        """Refuse flags that make no sense, alone or together. Raises SettingError."""
         if self.worlds is not None and self.worlds < 1:
-            raise InputError(f"--worlds {self.worlds}: give at least 1")
+            raise SettingError(f"--worlds {self.worlds}: give at least 1")
         if self.worlds is not None and self.route:
-            raise InputError("--worlds are those of generated routes; give it, or --route")
+            raise SettingError("--worlds is for generated routes; give it, or --route")
         if self.route and self.world is None:
-            raise InputError("--route leads through a world; give --world as well")
+            raise SettingError("--route leads through a world; give --world as well")
         check_workers(self.scheduler, self.workers)
 
     def routes(self) -> list[Path]:
-        """The route files that were given."""
+        """The given route files."""
         return [Path(name) for given in self.route for name in given.split(",") if name]
 
     def sweep(self, protocol: "Protocol") -> "Sweep":
-        """The runs, each checked. Raises InputError."""
-        import dataclasses
-
-        from ..studies.protocols import places
+        """The runs, each checked. Raises SettingError."""
+        from ..studies.protocols import routes_in
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
-        chosen: list[Choice] = places(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
-        sweep = protocol.sweep(chosen, quick=self.quick)
-        sweep = dataclasses.replace(
-            sweep, fixed=sweep.fixed | {"cull_back_faces": self.cull_back_faces, "seed": self.seed}
-        )
-        for run in sweep.runs():
-            run.check()
-        return sweep
+        routes = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
+        return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:
-        """What it is done with, in words."""
+        """The choices made, for the head of the report."""
         from tussock.world.params import is_generated
 
-        world, count = self.world or protocol.world, len(sweep.axes["place"])
+        world, count = self.world or protocol.world, len(sweep.axes["route"])
         seeds = f"seed {self.seed}" if count == 1 else f"seeds {self.seed} to {self.seed + count - 1}"
-        routes = ", ".join(map(str, self.routes())) or f"{count}, generated, {seeds}"
-        return {
+        about: dict[str, Any] = {
             "Paper": protocol.paper,
             "World": f"{world}, generated" if is_generated(world) else world,
-            "Routes": routes,
+            "Routes": ", ".join(map(str, self.routes())) or f"{count}, generated, {seeds}",
             "Walks": f"{len(sweep):,}",
-        } | {key: value for key, given, value in (
-            ("Seed", bool(self.routes()), self.seed),
-            ("Triangles", self.cull_back_faces, "seen from their front only"), ("Depth", self.quick, "a first look (--quick)"),
-        ) if given}  # fmt: skip
+        }
+        if self.route:
+            about["Seed"] = self.seed
+        if self.cull_back_faces:
+            about["Triangles"] = "seen from their front only"
+        if self.quick:
+            about["Depth"] = "a first look (--quick)"
+        return about
+
+    def command(self, out: Path) -> str:
+        """The command line that repeats this replication."""
+        given = flags_of(self, type(self), leave_out=("scheduler", "workers", "out", "overwrite", "json", "route"))
+        routes = [shlex.join(["--route", str(route)]) for route in self.routes()]
+        return " ".join(
+            filter(None, [f"tussock replicate {self.PROTOCOL}", given, *routes, f"--out {shlex.quote(str(out))}"])
+        )
 
 
-@dataclass
-class Ardin2016Command(ProtocolCommand):
-    """Ardin et al. 2016: errors along a route, by perfect memory, a mushroom body, Infomax and chance."""
+def protocol_commands(given: str = "") -> dict[str, type[ProtocolCommand]]:
+    """A command for each registered protocol, and for `given` where it is a `package.module:NAME`."""
+    from ..studies.protocols import PROTOCOLS
 
-    PROTOCOL = "ardin2016"
-
-
-@dataclass
-class Baddeley2012Command(ProtocolCommand):
-    """Baddeley et al. 2012: a route held in an Infomax network that saw each view once, against perfect memory."""
-
-    PROTOCOL = "baddeley2012"
+    return {name: _command(name) for name in [*PROTOCOLS.names, *[given] * (":" in given)]}
 
 
-@dataclass
-class Azevedo2025Command(ProtocolCommand):
-    """Azevedo Amin et al. 2025: how far from a route agents walk that begin up to 5.5 m beside it."""
-
-    PROTOCOL = "azevedo2025"
+def _command(name: str) -> type[ProtocolCommand]:
+    return type("ProtocolCommand", (ProtocolCommand,), {"PROTOCOL": name, "__doc__": sentence_of(name)})
 
 
-@dataclass
-class Kagioulis2024Command(ProtocolCommand):
-    """Kagioulis et al. 2024: whether knowing the order of the learned views helps to follow a route."""
+def sentence_of(name: str) -> str:
+    """What a protocol is about: the first line of its module's docstring. The module is read, not imported, as that takes long."""
+    from ..studies.protocols import PROTOCOLS
 
-    PROTOCOL = "kagioulis2024"
-
-
-REPLICATIONS = {
-    each.PROTOCOL: each for each in (Ardin2016Command, Baddeley2012Command, Azevedo2025Command, Kagioulis2024Command)
-}
+    where = PROTOCOLS.where(name)
+    if where is None:
+        return getattr(PROTOCOLS.find(name), "question", name)
+    module = where.partition(":")[0]
+    try:
+        spec = find_spec(module)
+        source = getattr(spec and spec.loader, "get_source", lambda module: None)(module)
+        return (ast.get_docstring(ast.parse(source or "")) or name).partition("\n")[0]
+    except Exception:  # a package that does not work is reported when it is used; it must not break the help
+        return name

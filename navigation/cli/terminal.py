@@ -14,11 +14,23 @@ def message(text: str) -> None:
     print(text, file=sys.stderr)
 
 
-class MessageHandler(logging.Handler):
-    """Prints what the library logs, as messages."""
+@contextmanager
+def library_messages() -> Iterator[None]:
+    """Print what the library logs, as messages, while the block runs."""
 
-    def emit(self, record: logging.LogRecord) -> None:
-        message(record.getMessage())
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            message(self.format(record))
+
+    logger = logging.getLogger("tussock")
+    handler, level = Handler(logging.INFO), logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)
 
 
 @contextmanager

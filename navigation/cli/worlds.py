@@ -39,9 +39,9 @@ class WorldCommand:
         world = World.generate(self.preset, self.seed)
         write_world(world, self.out)
         if self.picture is not None:
-            from ..reports.plots import overview
+            from ..reports.maps import write_overview
 
-            overview(world, self.picture, title=f"{self.preset}, seed {self.seed}")
+            write_overview(world, self.picture, title=f"{self.preset}, seed {self.seed}")
         return {"world": str(self.out), "preset": self.preset, "seed": self.seed, "triangles": len(world.triangles)}
 
 
@@ -126,9 +126,9 @@ class RouteCommand:
         route = generate_route(world, seed, self.length_m, goal=goal)
         write_route(route, self.out)
         if self.picture is not None:
-            from ..reports.plots import overview
+            from ..reports.maps import write_overview
 
-            overview(world, self.picture, route=route, title=f"{self.world}, route {seed}")
+            write_overview(world, self.picture, route=route, title=f"{self.world}, route {seed}")
         return {"route": str(self.out), "length_m": route.length, "start": route.start[:2], "goal": route.goal[:2]}
 
 

@@ -16,7 +16,7 @@ from tussock.world.route_files import write_route
 
 from ..experiment import Experiment, Trained
 from ..experiment_settings import run_command, settings_of
-from ..reports.plots import overview
+from ..reports.maps import write_overview
 from ..trajectory import Trajectory
 from .log import Recording
 from .viewer import check_viewer, save_screenshot, watch
@@ -74,7 +74,7 @@ def record_run(
         write_route(trained.route, out / ROUTE)
         deviation = f"{summary['mean_deviation_m']:.3f} m off the route on average"
         title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
-        overview(trained.renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, title=title)
+        write_overview(trained.renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, title=title)
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
         partial.write_text(json.dumps(summary | {"settings": settings}, indent=2, default=str) + "\n")

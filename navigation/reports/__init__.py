@@ -1,0 +1,5 @@
+"""Reports: claims and their tests, tables, figures and pages, for studies and sweeps."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

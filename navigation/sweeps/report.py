@@ -1,194 +1,209 @@
-"""The report of a sweep: one page with success and error by each axis, models in pairs, and the worst walks with why they failed."""
+"""The report of a sweep: success and error by axis, models in pairs, causes of failures, and the worst walks."""
 
 import dataclasses
-import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from tussock.render.renderer import open_renderer
-from tussock.world.atomic import replacing
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError
+from tussock.world.progress import Progress, no_progress
 
-from ..failures import CAUSES, Evidence, in_words
-from ..reports.findings import plain
-from ..reports.page import page, picture
-from ..studies.thesis.report import RESULTS as REPLICATED
-from ..training import training_views
-from .figures import along_axis, seen, walked
-from .spec import SETTINGS
-from .statistics import MEASURES, Interval, axes_of, by_axis, means, pairings, spoken, words
+from ..experiment_settings import TYPES, default_settings
+from ..failures import Cause
+from ..reports.page import format_value
+from ..reports.report import REPORT, Block, Cell, Command, Drawing, Report, Section, Table, Text, write_report
+from ..reports.report import RESULTS as REPLICATION_RESULTS
+from ..reports.results import plain_json
+from .figures import along_axis
+from .statistics import MEASURES, Interval, axes_of, by_axis, choice_label, means, pairings, setting_label
 from .store import Store, read_steps, table_of
-from .sweep import WORST, worst_of
-from .work import options_of
+from .sweep import worst_of
+from .worst import walk_section
 
-REPORT, RESULTS, FIGURES = "report.html", "report.json", "figures"
+RESULTS = "report.json"
+LEAD = "Success and errors of all runs, and why the worst of them failed."
+INTERVALS = (
+    "Numbers in parentheses are 95 % bootstrap confidence intervals of the mean. Runs in one world are not independent, so whole worlds "
+    "are drawn, with all of their runs; in a world from a file, whole routes. Where there is only one of these, single runs are drawn."
+)
+PAIRS = (
+    "Pairs, compared on the runs that are equal in everything else. A difference is the first minus the second; it is bold where its "
+    "interval does not contain 0."
+)
+FAILED = "Walks that did not arrive or were put back, by the cause that the evidence of their poor steps supports."
+WALKS = (
+    "From above: the route in blue to its goal, the walk in red, poor steps as dots, and a ring around the step that is shown. Views are "
+    "360 degrees wide, ahead in the middle."
+)
+FOOTER = "All numbers are in report.json, every run is in runs.parquet. docs/failures.md explains the causes and their limits."
 
 
-def write_sweep_report(
-    folder: Path, *, worst: int = 5, progress: Callable[[int, int], object] = lambda done, total: None
-) -> dict[str, Any]:
-    """Write report.html, report.json and the figures of a sweep into its folder; return report.json's content.
+def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_progress) -> dict[str, Any]:
+    """Write report.html, report.json and the figures of a sweep into its folder. The sweep may still run.
 
-    worst: how many of the worst walks are shown. A sweep may go on meanwhile. Raises InputError where the folder holds no
-    finished run, or a replication.
+    Args:
+        folder: Folder of the sweep.
+        worst: Number of worst walks to show.
+        progress: Called with the numbers of figures drawn and of all figures.
+
+    Returns:
+        The content of report.json.
+
+    Raises:
+        FileError: The folder holds no finished run, or a replication.
     """
-    if (folder / REPLICATED).exists():
-        raise InputError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
+    if (folder / REPLICATION_RESULTS).exists():
+        raise FileError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
     with Store(folder, read_only=True) as store:
         rows = store.rows()
         if not rows:
-            raise InputError(f"{folder} holds no finished run yet; give tussock sweep some time")
+            raise FileError(f"{folder} holds no finished run yet; try again later")
         shown = worst_of(rows, worst)
-        steps = {key: read_steps(store.steps(key)) for key in shown}
+        walks = [
+            walk_section(number, key, rows[key], read_steps(store.steps(key)), folder)
+            for number, key in enumerate(shown, 1)
+        ]
     table = table_of(rows)
-    ran = table[table["error"].isna()].reset_index(drop=True)
-    if ran.empty:
-        raise InputError(f"no run in {folder} could be done; the first: {table['error'].iloc[0]}")
-    settings = list(SETTINGS)
-    axes = axes_of(ran, settings)
-    reset = bool(ran["resets"].to_numpy().any())
-    measures = [name for name in MEASURES if name != "resets" or reset]
-    (folder / FIGURES).mkdir(exist_ok=True)
-    results = _results(table, ran, axes, settings, measures, shown)
-    by = axes.get(_models(axes), [])
-    exhibits = []
-    for number, (name, names) in enumerate(axes.items()):
-        progress(number, len(axes) + len(shown))
-        lines = [] if names == by else by
-        drawn = picture(along_axis(ran, names, measures, lines), folder / FIGURES, f"by-{'-'.join(names)}")
-        exhibits.append({"id": f"by-{'-'.join(names)}", "name": name, "rows": _rows(results["by"][name]), **drawn})
-    cases = []
-    for number, key in enumerate(shown, len(axes)):
-        progress(number, len(axes) + len(shown))
-        cases.append(_case(key, rows[key], steps[key], folder))
-    html = page(
-        "sweep.html", title=_title(folder), lead="What its runs say together, and why the worst of them failed.",
-        about=_about(table, ran, axes), measures=MEASURES, used=measures, exhibits=exhibits, pairs=results["pairs"], cases=cases,
-        causes=results["causes"], labels=CAUSES, not_run=results["could_not_run"],
-    )  # fmt: skip
-    with replacing(folder / RESULTS) as partial:
-        partial.write_text(json.dumps(results, indent=1) + "\n")
-    with replacing(folder / REPORT) as partial:
-        partial.write_text(html, encoding="utf-8")
-    return results
+    completed = table[table["error"].isna()].reset_index(drop=True)
+    if completed.empty:
+        raise FileError(f"no run in {folder} could be completed; the first: {table['error'].iloc[0]}")
+    axes = axes_of(completed, list(TYPES))
+    measures = [name for name in MEASURES if name != "resets" or completed["resets"].to_numpy().any()]
+    results = plain_json(_results(table, completed, axes, measures, shown))
+    report = Report(
+        title=f"Sweep {folder.resolve().name}",
+        lead=LEAD,
+        about=_about(table, completed, axes),
+        blocks=_blocks(completed, axes, measures, results, walks),
+        footer=FOOTER,
+        results=results,
+        results_file=RESULTS,
+    )
+    return write_report(report, folder, progress)
 
 
 def _results(
-    table: pd.DataFrame,
-    ran: pd.DataFrame,
-    axes: dict[str, list[str]],
-    settings: list[str],
-    measures: list[str],
-    shown: list[str],
+    table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[str]], measures: list[str], worst: list[str]
 ) -> dict[str, Any]:
     """Everything in numbers; docs/sweeps.md explains it."""
-    by = axes.get(_models(axes), [])
-    failed = ran[~ran["arrived"].astype(bool) | (ran["resets"] > 0)]
+    by = _compared(axes)
+    failed = completed[~completed["arrived"].astype(bool) | (completed["resets"] > 0)]
     groups = failed.groupby(by, dropna=False) if by else [("all", failed)]
     not_run = table[table["error"].notna()]
-    return plain({
-        "version": 1, "runs": len(table), "measures": _numbers(means(ran, measures)),
-        "by": {
-            name: {choice: {"runs": count, **_numbers(found)} for choice, (count, found) in by_axis(ran, names, measures).items()}
-            for name, names in axes.items()
-        },
-        "pairs": [dataclasses.asdict(pair) for pair in (pairings(ran, settings, measures, by) if by else [])],
-        "causes": {
-            words(key): {label: int((part["cause"] == label).sum()) for label in CAUSES} for key, part in groups
-        },
-        "worst": shown,
-        "could_not_run": [{"command": row.command, "error": row.error} for row in not_run.itertuples()],
-    })  # fmt: skip
-
-
-def _models(axes: dict[str, list[str]]) -> str:
-    """The axis whose choices are compared in pairs: that of models, or that of encodings where there is none."""
-    return next((name for wanted in ("model", "encoding") for name, names in axes.items() if wanted in names), "")
-
-
-def _numbers(found: dict[str, Interval]) -> dict[str, Any]:
-    return {measure: dataclasses.asdict(interval) for measure, interval in found.items()}
-
-
-def _rows(choices: dict[str, dict[str, Any]]) -> list[tuple[str, int, list[tuple]]]:
-    """A row a choice: its name, how many runs, and value, low, high of each measure."""
-    return [
-        (name, found["runs"], [tuple(interval.values()) for measure, interval in found.items() if measure != "runs"])
-        for name, found in choices.items()
-    ]  # fmt: skip
-
-
-def _about(table: pd.DataFrame, ran: pd.DataFrame, axes: dict[str, list[str]]) -> dict[str, Any]:
-    """What was swept, in words."""
-    fixed = {name: ran[name].iloc[0] for name in SETTINGS if not any(name in names for names in axes.values())}
-    said = [
-        f"{spoken(name)} {value}"
-        for name, value in fixed.items()
-        if not pd.isna(value) and value != SETTINGS[name].default
-    ]
-    varied = [f"{name}: {ran.groupby(names, dropna=False).ngroups}" for name, names in axes.items()]
     return {
-        "Runs": f"{len(table)}, of which {len(ran)} could be done; {int(ran['arrived'].sum())} arrived",
-        "Varied": "; ".join(varied) or "nothing",
-        "The same in all": "; ".join(said) or "everything as by default",
-    }  # fmt: skip
-
-
-def _case(key: str, row: dict[str, Any], steps: pd.DataFrame, folder: Path) -> dict[str, Any]:
-    """What the page shows of a walk: why it failed, the walk from above, and what was seen where it went wrong."""
-    run = options_of(row)
-    at = _turning_point(row, steps)
-    here = np.column_stack([steps["x_m"], steps["y_m"], np.radians(steps["heading_deg"])])[[at]]
-    shown = {
-        "key": key, "command": row["command"], "settings": row, "words": _outcome(row), "step": at,
-        "evidence": evidence_words(steps.iloc[at]),
-        "recording": f"{WORST}/{key}/recording.rrd" if (folder / WORST / key / "summary.json").exists() else None,
-    }  # fmt: skip
-    try:
-        world, route = run.open_route()
-        lesson = run.prepare((world, route))
-        with open_renderer(world, run.eye(), run.renderer) as renderer:
-            view = renderer.render(here)[0]
-            recognised = None
-            if lesson.saved is None and not pd.isna(match := steps["match"].iloc[at]):
-                _, learned = training_views(lesson.encoding, renderer, lesson.poses)
-                recognised = renderer.render(learned[[int(match)]])[0]
-    except InputError as error:
-        return shown | {"nothing": str(error)}
-    drawn = {
-        "above": picture(walked(world, route, steps, at), folder / FIGURES, f"walk-{key}"),
-        "seen": picture(seen(view, recognised), folder / FIGURES, f"view-{key}"),
+        "version": 1,
+        "runs": len(table),
+        "measures": _numbers(means(completed, measures)),
+        "by": {
+            label: {
+                choice: {"runs": count, **_numbers(intervals)}
+                for choice, (count, intervals) in by_axis(completed, names, measures).items()
+            }
+            for label, names in axes.items()
+        },
+        "pairs": [dataclasses.asdict(pair) for pair in (pairings(completed, list(TYPES), measures, by) if by else [])],
+        "causes": {
+            choice_label(key): {cause: int((part["cause"] == cause).sum()) for cause in Cause} for key, part in groups
+        },
+        "worst": worst,
+        "could_not_run": [{"command": row.command, "error": row.error} for row in not_run.itertuples()],
     }
-    return shown | drawn | {"nothing": None}
 
 
-def _turning_point(row: dict[str, Any], steps: pd.DataFrame) -> int:
-    """The step to look at: the last that failed for the walk's cause, else the one farthest off the route."""
-    same = steps.index[steps["cause"] == row["cause"]] if row["cause"] else []
-    return int(same[-1]) if len(same) else int(steps["deviation_m"].idxmax())
+def _compared(axes: dict[str, list[str]]) -> list[str]:
+    """The settings of the axis whose choices are compared in pairs: that of models, or else that of encodings, or none."""
+    return next((names for wanted in ("model", "encoding") for names in axes.values() if wanted in names), [])
 
 
-def evidence_words(step: pd.Series) -> str | None:
-    """Why a step of a trajectory was poor, with its evidence; None for a good one."""
-    known = step.dropna().to_dict()
-    if "cause" not in known:
-        return None
-    error, turning = (float(np.radians(known[name])) for name in ("error_deg", "turning_deg"))
-    nearest, recognised = known.get("nearest_view_m"), known.get("recognised_view_m")
-    return in_words(
-        Evidence(covered=known["covered"], nearest=nearest, recognised=recognised, error=error, turning=turning)
+def _numbers(intervals: dict[str, Interval]) -> dict[str, Any]:
+    return {measure: dataclasses.asdict(interval) for measure, interval in intervals.items()}
+
+
+def _about(table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[str]]) -> dict[str, Any]:
+    """What was swept, for the head of the report."""
+    varied = {name for names in axes.values() for name in names}
+    fixed = {name: completed[name].iloc[0] for name in TYPES if name in completed and name not in varied}
+    defaults = default_settings()
+    equal = [
+        f"{setting_label(name)} {value}"
+        for name, value in fixed.items()
+        if not pd.isna(value) and value != defaults[name]
+    ]
+    choices = [f"{label}: {completed.groupby(names, dropna=False).ngroups}" for label, names in axes.items()]
+    count = "all" if len(completed) == len(table) else str(len(completed))
+    return {
+        "Runs": f"{len(table)} runs, {count} completed, {int(completed['arrived'].sum())} arrived",
+        "Varied": "; ".join(choices) or "nothing",
+        "Equal in all runs": "; ".join(equal) or "everything has its default",
+    }
+
+
+def _blocks(
+    completed: pd.DataFrame,
+    axes: dict[str, list[str]],
+    measures: list[str],
+    results: dict[str, Any],
+    walks: list[Section],
+) -> list[Block]:
+    """The content of the page."""
+    blocks: list[Block] = [Text(INTERVALS, style="soft")]
+    blocks += [_axis(completed, label, axes, measures, results["by"][label]) for label in axes]
+    if results["pairs"]:
+        blocks.append(_pairs(results["pairs"], measures))
+    causes = Table(
+        columns=["", *Cause],
+        rows=[[label, *map(str, counts.values())] for label, counts in results["causes"].items()]
+        or [["No walk failed.", *[""] * len(Cause)]],
     )
+    blocks.append(Section(title="Why walks failed", anchor="causes", blocks=[Text(FAILED), causes]))
+    blocks.append(Section(title="The worst walks", anchor="worst", blocks=[Text(WALKS, style="soft"), *walks]))
+    if results["could_not_run"]:
+        errors = [
+            block for each in results["could_not_run"] for block in (Text(each["error"]), Command(each["command"]))
+        ]
+        blocks.append(Section(title="Runs that could not be completed", anchor="not-run", blocks=errors))
+    return blocks
 
 
-def _outcome(row: dict[str, Any]) -> str:
-    """What became of a walk."""
-    end = f"{row['reason']} after {row['steps']} steps, {100 * row['mean_deviation_m']:.1f} cm off the route on average"
-    return end + (f", put back {row['resets']} times" if row["resets"] else "")
+def _axis(
+    completed: pd.DataFrame, label: str, axes: dict[str, list[str]], measures: list[str], choices: dict[str, Any]
+) -> Section:
+    """The measures along an axis, as a figure and as a table."""
+    names, by = axes[label], _compared(axes)
+    anchor = f"by-{'-'.join(names)}"
+    lines = [] if names == by else by
+    drawing = Drawing(
+        names=(anchor,), draw=lambda: [along_axis(completed, names, measures, lines)], alt=f"Means by {label}"
+    )
+    table = Table(
+        columns=[label, "runs", *(MEASURES[measure] for measure in measures)],
+        rows=[
+            [choice, str(numbers["runs"]), *(_cell(numbers[measure]) for measure in measures)]
+            for choice, numbers in choices.items()
+        ],
+    )
+    return Section(title=f"By {label}", anchor=anchor, blocks=[drawing, table])
 
 
-def _title(folder: Path) -> str:
-    return f"Sweep {folder.resolve().name}"
+def _pairs(pairs: list[dict[str, Any]], measures: list[str]) -> Section:
+    """The choices of an axis in pairs."""
+    columns = ["first", "second", "pairs"]
+    for measure in measures:
+        columns += [MEASURES[measure], "better, worse"]
+    rows = []
+    for pair in pairs:
+        cells: list[str | Cell] = [pair["first"], pair["second"], str(pair["pairs"])]
+        for measure in measures:
+            difference = pair["difference"][measure]
+            apart = difference["low"] is not None and (difference["low"] > 0 or difference["high"] < 0)
+            cells += [_cell(difference, bold=apart), f"{pair['better'][measure]}, {pair['worse'][measure]}"]
+        rows.append(cells)
+    return Section(title="In pairs", anchor="pairs", blocks=[Text(PAIRS), Table(columns=columns, rows=rows)])
+
+
+def _cell(interval: dict[str, float | None], *, bold: bool = False) -> Cell:
+    """A mean with its interval."""
+    low, high = interval["low"], interval["high"]
+    note = "" if low is None else f"({format_value(low)} to {format_value(high)})"
+    return Cell(text=format_value(interval["value"]), note=note, bold=bold)

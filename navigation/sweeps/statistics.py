@@ -1,4 +1,4 @@
-"""What the runs of a sweep say together: means with bootstrap confidence intervals, by each axis and between models."""
+"""Statistics of a sweep's runs: means with bootstrap confidence intervals, by axis, and differences between models."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,15 +13,16 @@ from tussock.world.params import is_generated
 
 SAMPLES = 4000  # of a bootstrap
 CONFIDENCE = 0.95
-MEASURES = {  # what is compared: column of the table -> words
+MEASURES = {  # columns of the table of runs, with their labels
     "arrived": "share that arrived",
     "mean_deviation_m": "mean deviation from the route (m)",
     "mean_error_deg": "mean heading error (°)",
     "resets": "times put back on the route",
 }
 HIGHER_IS_BETTER = ("arrived",)
-_RANK = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # what is asked first, and last
-AT_ONCE = 2**22  # numbers that are drawn
+UNITS = {"m": "m", "deg": "°"}
+AXIS_ORDER = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # other axes are 1
+MAX_DRAWS = 2**22  # random numbers in memory at once
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,15 @@ class Interval:
 
 @dataclass(frozen=True, kw_only=True)
 class Pairing:
-    """Two models compared over pairs of runs that are alike in all else. difference: of the first less the second, by measure.
+    """Two choices of an axis, two models for example, compared on pairs of runs that are equal in everything else.
 
-    better, worse: pairs in which the first did better, or worse, than the second.
+    Attributes:
+        first: Label of the first choice.
+        second: Label of the second choice.
+        pairs: Number of pairs.
+        difference: Mean of the first minus the second, by measure.
+        better: Number of pairs in which the first is better, by measure.
+        worse: Number of pairs in which the first is worse, by measure.
     """
 
     first: str
@@ -51,8 +58,13 @@ class Pairing:
 def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"], seed: int = 0) -> Interval:
     """Mean of values and its percentile bootstrap interval. Whole groups are drawn, as runs in one world are not independent.
 
-    groups: number of the group of each value. Where there is but one group, single values are drawn. nan where nothing can be said:
-    of the mean of no values, and of the interval of one.
+    Args:
+        values: The values.
+        groups: Number of each value's group. For a single group, single values are drawn.
+        seed: Seed of the draws.
+
+    Returns:
+        The interval; nan for what is undetermined: the mean of no values, and the interval of fewer than two.
     """
     if len(values) < 2:
         return Interval(float(values.sum()) if len(values) else np.nan, np.nan, np.nan)
@@ -60,44 +72,60 @@ def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]
         groups = np.arange(len(values))
     _, number = np.unique(groups, return_inverse=True)
     sums, counts = np.bincount(number, weights=values), np.bincount(number)
-    rng, part = np.random.default_rng(seed), min(SAMPLES, max(1, AT_ONCE // len(sums)))
+    rng, batch = np.random.default_rng(seed), min(SAMPLES, max(1, MAX_DRAWS // len(sums)))
     means = np.empty(SAMPLES)
-    for begin in range(0, SAMPLES, part):
-        here = means[begin : begin + part]
-        drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=len(here))
-        here[:] = (drawn @ sums) / (drawn @ counts)
+    for begin in range(0, SAMPLES, batch):
+        part = means[begin : begin + batch]
+        drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=len(part))
+        part[:] = (drawn @ sums) / (drawn @ counts)
     low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Interval(float(values.mean()), float(low), float(high))
 
 
 def worlds_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
-    """Number of the world of each run; in a world from a file, of the route through it."""
+    """Number of each run's group: its world, or in a world from a file its route."""
     generated = table["world"].map(is_generated).astype(bool)
     given = table[["world_seed", "route_seed"]].astype(object)
     seeds = given.where(given.notna(), table[["seed", "seed"]].to_numpy(dtype=object))
-    where = pd.DataFrame({
-        "world": table["world"], "world_seed": seeds["world_seed"].where(generated),
-        "route": table["route"].mask(generated), "route_seed": seeds["route_seed"].mask(generated | table["route"].notna()),
-    })  # fmt: skip
-    return where.groupby(list(where), dropna=False, sort=False).ngroup().to_numpy()
+    columns = {
+        "world": table["world"],
+        "world_seed": seeds["world_seed"].where(generated),
+        "route": table["route"].mask(generated),
+        "route_seed": seeds["route_seed"].mask(generated | table["route"].notna()),
+    }
+    groups = pd.DataFrame(columns).groupby(list(columns), dropna=False, sort=False)
+    return groups.ngroup().to_numpy()
 
 
 def axes_of(table: pd.DataFrame, settings: Sequence[str]) -> dict[str, list[str]]:
-    """What varies between runs: by the name of an axis, the settings that make it. Those that vary together are one axis."""
+    """The axes of a table of runs: by label, the settings that vary. Settings that always vary together are one axis."""
     axes: dict[bytes, list[str]] = {}
-    for name in settings:
+    for name in table.columns.intersection(settings, sort=False):
         partition, values = pd.factorize(table[name].astype("object"), use_na_sentinel=False)
         if len(values) > 1:
             axes.setdefault(partition.tobytes(), []).append(name)
-    inorder = sorted(axes.values(), key=lambda names: _RANK.get(names[0], 1))
-    return {" and ".join(map(spoken, names)): names for names in inorder}
+    ordered = sorted(axes.values(), key=lambda names: AXIS_ORDER.get(names[0], 1))
+    return {axis_label(names): names for names in ordered}
 
 
-def spoken(setting: str) -> str:
-    """A setting's name as people say it, its unit in parentheses."""
+def axis_label(settings: Sequence[str]) -> str:
+    """The label of an axis: the names of its settings, with units in parentheses."""
+    return " and ".join(map(setting_label, settings))
+
+
+def setting_label(setting: str) -> str:
+    """A setting's name as a label, with its unit in parentheses."""
     name, _, unit = setting.rpartition("_")
-    units = {"m": "m", "deg": "°"}
-    return f"{name.replace('_', ' ')} ({units[unit]})" if unit in units else setting.replace("_", " ")
+    return f"{name.replace('_', ' ')} ({UNITS[unit]})" if unit in UNITS else setting.replace("_", " ")
+
+
+def choice_label(key: object) -> str:
+    """A choice of an axis as a label: its value, or its values with commas between them."""
+    values: tuple[Any, ...] = key if isinstance(key, tuple) else (key,)
+    return ", ".join(
+        "by default" if pd.isna(value) else repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
+        for value in values
+    )
 
 
 def means(table: pd.DataFrame, measures: Sequence[str]) -> dict[str, Interval]:
@@ -111,23 +139,14 @@ def by_axis(
 ) -> dict[str, tuple[int, dict[str, Interval]]]:
     """Number of runs, and `means`, for each choice of an axis, in order."""
     parts = table.groupby(names, dropna=False, sort=True)
-    return {words(key): (len(part), means(part, measures)) for key, part in parts}
-
-
-def words(key: object) -> str:
-    """A choice of an axis as people read it."""
-    values: tuple[Any, ...] = key if isinstance(key, tuple) else (key,)
-    return ", ".join(
-        "by default" if pd.isna(value) else repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
-        for value in values
-    )
+    return {choice_label(key): (len(part), means(part, measures)) for key, part in parts}
 
 
 def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[str], axis: list[str]) -> list[Pairing]:
-    """Every two choices of an axis, of models for example, compared over the runs for which all other settings are alike."""
-    rest = [name for name in settings if name not in axis]
-    parts = {words(key): part for key, part in table.groupby(axis, dropna=False, sort=True)}
-    found = []
+    """Every two choices of an axis, compared on the runs for which all other settings are equal."""
+    rest = [name for name in table.columns.intersection(settings, sort=False) if name not in axis]
+    parts = {choice_label(key): part for key, part in table.groupby(axis, dropna=False, sort=True)}
+    results = []
     for first, second in combinations(parts, 2):
         both = parts[first].merge(parts[second], on=rest, suffixes=("", "_other"), validate="one_to_one")
         if both.empty:
@@ -138,7 +157,8 @@ def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[st
             gain = values if measure in HIGHER_IS_BETTER else -values
             difference[measure] = mean_interval(values, groups)
             better[measure], worse[measure] = int((gain > 0).sum()), int((gain < 0).sum())
-        found.append(
-            Pairing(first=first, second=second, pairs=len(both), difference=difference, better=better, worse=worse)
+        pairing = Pairing(
+            first=first, second=second, pairs=len(both), difference=difference, better=better, worse=worse
         )
-    return found
+        results.append(pairing)
+    return results

@@ -1,21 +1,6 @@
-"""Published experiments, to be done again in any world: what `tussock replicate` knows beside the thesis."""
+"""Published experiments that can be done again in any world, by name."""
 
-from .ardin2016 import ARDIN2016
-from .azevedo2025 import AZEVEDO2025
-from .baddeley2012 import BADDELEY2012
-from .kagioulis2024 import KAGIOULIS2024
-from .protocol import Exhibit, Parameter, Protocol, places
+import lazy_loader
 
-PROTOCOLS = {protocol.name: protocol for protocol in (ARDIN2016, BADDELEY2012, AZEVEDO2025, KAGIOULIS2024)}
-
-__all__ = [
-    "ARDIN2016",
-    "AZEVEDO2025",
-    "BADDELEY2012",
-    "KAGIOULIS2024",
-    "PROTOCOLS",
-    "Exhibit",
-    "Parameter",
-    "Protocol",
-    "places",
-]
+# The names and where they are stand in __init__.pyi; each is loaded when it is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

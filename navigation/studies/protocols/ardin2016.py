@@ -1,155 +1,209 @@
-"""Ardin et al. 2016: errors along a route by perfect memory, a mushroom body, Infomax and chance."""
+"""Ardin et al. 2016: errors along a route, by perfect memory, a mushroom body, Infomax and chance."""
 
 import pandas as pd
 
-from ...reports.findings import Claim, Findings
-from .figures import boxes, curves
-from .protocol import Exhibit, Parameter, Protocol, by_model
+from tussock.render.eye import Eye
 
-DISPLACEMENTS = (0.05, 0.10, 0.15, 0.20, 0.25)  # m, to either side
+from ...body import Body
+from ...experiment import Experiment
+from ...reports.claims import Claim, Decision
+from ...reports.results import StudyResults
+from ...stopping import StoppingRules
+from ...training_setup import TrainingSetup
+from .figures import boxes_by_model, lines_by_model
+from .protocol import Item, Parameter, Protocol, models_in
+
 PERFECT, BODY, INFOMAX, RANDOM = "perfect-memory", "mushroom-body", "infomax", "random"
 MODELS = (PERFECT, f"{BODY} inputs=10 cells=20000", f"{INFOMAX} rate=unit-range", RANDOM)
 
 
-def measures(walks: pd.DataFrame) -> Findings:
+def _starts(*displacements: float) -> list[dict[str, float]]:
+    """Starts at displacements (m) to the left and to the right of the route."""
+    return [{"start_offset": side * each} for each in displacements for side in (1, -1)]
+
+
+def measure(walks: pd.DataFrame) -> StudyResults:
     """Errors of each model: how often a walk was put back on the route."""
-    walks = walks.assign(errors=walks["resets"], displacement_cm=(100 * walks["offset_m"].abs()).round().astype(int))
-    by_displacement = _mean_errors(walks, "displacement_cm").rename(columns=lambda name: _cm(name))
-    by_route = _mean_errors(walks, "place")
+    displacement_cm = (100 * walks["offset_m"].abs()).round().astype(int)
+    walks = walks.assign(errors=walks["resets"], displacement_cm=displacement_cm)
+    by_displacement = _mean_errors(walks, "displacement_cm")
+    by_displacement.columns = [f"{name} cm" if isinstance(name, int) else name for name in by_displacement]
     grouped = walks.groupby("model", sort=False)
     overall = grouped["errors"].agg(["mean", "median", "min", "max"]).add_suffix(" errors a walk")
     overall["walks"] = grouped.size()
     overall["arrived"] = grouped["arrived"].mean()
     mean = grouped["errors"].mean()
-    tables = {
-        "by_displacement": by_displacement.reset_index(), "by_route": by_route.reset_index(), "by_model": overall.reset_index(),
-        "walks": walks[["model", "place", "displacement_cm", "offset_m", "errors", "arrived", "steps", "mean_deviation_m"]],
-    }  # fmt: skip
-    return Findings(
-        tables=tables, numbers={f"errors, {name}": float(mean[name]) for name in by_model(walks)}, claims=_claims(mean)
+    columns = ["model", "place", "displacement_cm", "offset_m", "errors", "arrived", "steps", "mean_deviation_m"]
+    return StudyResults(
+        tables={
+            "by_displacement": by_displacement.reset_index(),
+            "by_route": _mean_errors(walks, "place").reset_index(),
+            "by_model": overall.reset_index(),
+            "walks": walks[columns],
+        },
+        numbers={f"errors, {name}": float(mean[name]) for name in models_in(walks)},
     )
 
 
 def _mean_errors(walks: pd.DataFrame, column: str) -> pd.DataFrame:
-    """Mean errors a walk: a row a model, a column for each value of a column, and for all walks."""
+    """Mean errors per walk: one row per model, one column per value of a column, and one for all walks."""
     table = walks.pivot_table(index="model", columns=column, values="errors", aggfunc="mean", sort=False).astype(float)
     table = table[sorted(table.columns)]
-    return table.assign(all=walks.groupby("model")["errors"].mean()).loc[by_model(walks)]
+    return table.assign(all=walks.groupby("model")["errors"].mean()).loc[models_in(walks)]
 
 
-def _cm(name: object) -> str:
-    return f"{name} cm" if isinstance(name, int) else str(name)
+def _errors(results: StudyResults, *models: str) -> dict[str, float]:
+    """Errors per walk of some models, by the label of a claim."""
+    return {f"errors a walk, {model}": results.numbers[f"errors, {model}"] for model in models}
 
 
-def _claims(mean: pd.Series) -> list[Claim]:
-    """What the paper says of its figure 4D. mean: errors a walk by model."""
-    others = mean.drop(RANDOM)
-    published = "Published as box plots only (figure 4D)."
-    return [
-        Claim(
-            key="random-worst", statement="All three memories make fewer errors than a random choice of direction.",
-            figure="by-displacement", published={},
-            obtained={f"errors a walk, {name}": float(value) for name, value in mean.to_dict().items()},
-            test="each of the others makes fewer errors a walk than random", holds=bool(others.max() < mean[RANDOM]),
-            note=published,
+def _random_worst(results: StudyResults) -> Decision:
+    obtained = _errors(results, PERFECT, BODY, INFOMAX, RANDOM)
+    *others, random = obtained.values()
+    return Decision(obtained, max(others) < random)
+
+
+def _perfect_best(results: StudyResults) -> Decision:
+    obtained = _errors(results, PERFECT, BODY, INFOMAX)
+    perfect, *others = (*obtained.values(), results.numbers[f"errors, {RANDOM}"])
+    return Decision(obtained, perfect <= min(others))
+
+
+def _body_close(results: StudyResults) -> Decision:
+    perfect, body, random = _errors(results, PERFECT, BODY, RANDOM).values()
+    share = (body - perfect) / (random - perfect) if random != perfect else float("nan")
+    return Decision({"share of the way from perfect memory to random": share}, share <= 0.1)
+
+
+NOTE = "Published as box plots only (figure 4D)."
+CLAIMS = (
+    Claim(
+        key="random-worst",
+        statement="All three memories make fewer errors than a random choice of direction.",
+        figure="by-displacement",
+        test="each of the others makes fewer errors per walk than random",
+        decide=_random_worst,
+        note=NOTE,
+    ),
+    Claim(
+        key="perfect-best",
+        statement="Perfect memory, which stores every view, makes the fewest errors.",
+        figure="by-model",
+        test="no other model makes fewer errors per walk",
+        decide=_perfect_best,
+        note=NOTE,
+    ),
+    Claim(
+        key="body-close",
+        statement="The mushroom body follows routes nearly as well as perfect memory.",
+        figure="by-model",
+        test="its errors lie in the first tenth of the way from perfect memory's to random's",
+        decide=_body_close,
+        note=NOTE,
+    ),
+)
+
+PARAMETERS = (
+    Parameter("Routes", "15 of about 8 m in the Sussex world", "those given, or 15 generated ones of 8 m"),
+    Parameter("Views learned", "every 10 cm of the route", "every 10 cm of the route"),
+    Parameter("Step", "10 cm", "10 cm"),
+    Parameter("Scan", "120 degrees in steps of 2", "120 degrees in steps of 2, refined between steps"),
+    Parameter(
+        "View",
+        "36 x 10, after inversion and CLAHE",
+        "pixels of a 36 x 10 view, after inversion and CLAHE, one every 2 degrees",
+    ),
+    Parameter(
+        "Error",
+        "more than 20 cm off the route; put back at the waypoint after the furthest one reached",
+        "the same; waypoints every 10 cm",
+    ),
+    Parameter("Arrival", "within 20 cm", "within 20 cm"),
+    Parameter("Steps", "1,000 at most", "1,000 at most"),
+    Parameter("Starts", "displaced by 5 to 25 cm", "5, 10, 15, 20 and 25 cm to both sides"),
+    Parameter(
+        "Mushroom body",
+        "360 projection neurons, 20,000 Kenyon cells of 10 inputs, one output",
+        "the same numbers, not spiking",
+    ),
+)
+
+DIFFERENCES = (
+    "The mushroom body has no spikes: a sum and a ranking of its cells replace them (docs/models.md). It adapts to contrast and averages "
+    "familiarity over neighbouring rotations, 6 degrees.",
+    "Views are as fine as 36 x 10, but there is one such pixel every 2 degrees, so that rotations by 2 degrees need no interpolated image. "
+    "Perfect memory and Infomax compare 180 x 10 overlapping pixels. The most familiar rotation is refined by a parabola through its "
+    "neighbours.",
+    "An agent that walks 3 m without progress along the route, or leaves the world, is put back as well, and that is an error.",
+    "A start 20 or 25 cm to the side of the route is at or beyond the 20 cm that count as an error: one at 25 cm is put back at once, "
+    "which is one error of every model.",
+    "Unknown, and chosen by us: clip limit (2) and tiles (8 x 8) of CLAHE, elevations (-15 to 60 degrees), and the learning rate of "
+    "Infomax (that for views in 0..1).",
+    "The control draws a random heading for each different view; it draws the same one where it meets the same view again.",
+)
+
+ITEMS = (
+    Item(
+        name="by-displacement",
+        title="Errors by displacement",
+        table="by_displacement",
+        caption="Mean errors per walk over all routes and both sides, by the displacement of the start from the route.",
+    ),
+    Item(
+        name="errors",
+        title="Errors against displacement",
+        table="walks",
+        caption="Mean errors per walk; bars are standard errors of the mean.",
+        draw=lambda walks: lines_by_model(
+            walks, "displacement_cm", "errors", "displacement of the start (cm)", "errors per walk"
         ),
-        Claim(
-            key="perfect-best", statement="Perfect memory, which keeps every view, makes the fewest errors.", figure="by-model",
-            published={}, obtained={f"errors a walk, {name}": float(value) for name, value in others.to_dict().items()},
-            test="no other model makes fewer errors a walk", holds=bool(mean[PERFECT] <= mean.min()), note=published,
-        ),
-        Claim(
-            key="body-close", statement="The mushroom body follows routes nearly as well as perfect memory.", figure="by-model",
-            published={}, obtained={"share of the way from perfect memory to random": _share(mean, BODY)},
-            test="its errors lie in the first tenth of the way from perfect memory's to random's",
-            holds=_share(mean, BODY) <= 0.1, note=published,
-        ),
-    ]  # fmt: skip
-
-
-def _share(mean: pd.Series, model: str) -> float:
-    """Where a model's errors lie between perfect memory's, 0, and random's, 1."""
-    return float((mean[model] - mean[PERFECT]) / (mean[RANDOM] - mean[PERFECT]))
-
+    ),
+    Item(
+        name="by-model",
+        title="Errors of all walks",
+        table="by_model",
+        caption="Over all routes and displacements. Arrived: share of the walks that arrived within 1,000 steps; the other walks "
+        "count with the errors that they had made by then.",
+    ),
+    Item(
+        name="boxes",
+        title="Errors of each model, as in figure 4D of the paper",
+        table="walks",
+        caption="Median, quartiles, lowest and highest of all walks.",
+        draw=lambda walks: boxes_by_model(walks, "errors", "errors per walk"),
+    ),
+    Item(
+        name="by-route",
+        title="Errors by route",
+        table="by_route",
+        caption="Mean errors per walk, over all displacements.",
+    ),
+)
 
 ARDIN2016 = Protocol(
     name="ardin2016",
     title="Errors along a route: perfect memory, mushroom body, Infomax, chance",
     paper="Ardin P, Peng F, Mangan M, Lagogiannis K, Webb B (2016). Using an insect mushroom body circuit to encode route memory in "
     "complex natural environments. PLoS Computational Biology 12(2), e1004683.",
-    question="How often does an agent stray from a route it has learned, by the memory it has learned it with?",
-    settings={
-        "size": "720x40", "samples": 2, "encoding": "grey | invert | clahe 2 8 | resize 4 | widen 5", "spacing_m": 0.1,
-        "learning_walk_m": 0.0,
-        "step_m": 0.1, "scan_deg": 120.0, "on_lost": "reset", "lost_m": 0.2, "waypoint_m": 0.1, "arrive_m": 0.2, "max_steps": 1000,
-        "route_length_m": 8.0,
-    },
-    axes={
-        "model": [{"model": model} for model in MODELS],
-        "offset_m": [{"offset_m": side * each} for each in DISPLACEMENTS for side in (1, -1)],
-    },
+    question="How often does an agent leave a route that it has learned, with different memories?",
+    experiment=Experiment(
+        eye=Eye(width=720, height=40, samples=2),
+        encoding="grey | invert | clahe 2 8 | resize 4 | widen 5",
+        navigator="scan width_deg=120",
+        route_length=8.0,
+        training=TrainingSetup(spacing=0.1, learning_walk=0.0),
+        body=Body(step_length=0.1),
+        stopping=StoppingRules(
+            arrival_radius=0.2, max_deviation=0.2, max_steps=1000, put_back=True, waypoint_spacing=0.1
+        ),
+    ),
+    axes={"model": [{"model": model} for model in MODELS], "start_offset": _starts(0.05, 0.10, 0.15, 0.20, 0.25)},
     worlds=15,
     quick_worlds=2,
-    quick_axes={"offset_m": [{"offset_m": side * each} for each in (0.05, 0.15, 0.25) for side in (1, -1)]},
-    parameters=(
-        Parameter(
-            name="Routes", published="15 of about 8 m in the Sussex world",
-            here="those given, or 15 generated ones of 8 m",
-        ),
-        Parameter(name="Views learned", published="every 10 cm of the route", here="every 10 cm of the route"),
-        Parameter(name="Step", published="10 cm", here="10 cm"),
-        Parameter(name="Scan", published="120 degrees in steps of 2", here="120 degrees in steps of 2, refined between steps"),
-        Parameter(
-            name="View", published="36 x 10, after inversion and CLAHE",
-            here="pixels of a 36 x 10 view, after inversion and CLAHE, one every 2 degrees",
-        ),
-        Parameter(
-            name="Error", published="more than 20 cm off; put back at the waypoint after the furthest",
-            here="the same; waypoints every 10 cm",
-        ),
-        Parameter(name="Arrival", published="within 20 cm", here="within 20 cm"),
-        Parameter(name="Steps", published="1,000 at most", here="1,000 at most"),
-        Parameter(name="Starts", published="displaced by 5 to 25 cm", here="5, 10, 15, 20 and 25 cm to both sides"),
-        Parameter(
-            name="Mushroom body", published="360 projection neurons, 20,000 Kenyon cells of 10 inputs, one output",
-            here="the same numbers, not spiking",
-        ),
-    ),
-    differences=(
-        "The mushroom body has no spikes: a sum and a ranking of its cells take their place (docs/models.md). It adapts to contrast "
-        "and averages familiarity over neighbouring rotations, 6 degrees.",
-        "Views are as fine as 36 x 10, but there is one such pixel every 2 degrees, so that rotations by 2 degrees need no "
-        "interpolated image: perfect memory and Infomax compare 180 x 10 overlapping pixels. The most familiar rotation is refined by "
-        "a parabola through its neighbours.",
-        "An agent that walks 3 m without getting farther along the route, or leaves the world, is put back as well, and that is an error.",
-        "A start 20 or 25 cm beside the route is at or beyond the 20 cm that count as an error: one at 25 cm is put back at once, "
-        "which is one error of every model.",
-        "Clip limit (2) and tiles (8 x 8) of CLAHE, elevations (-15 to 60 degrees) and the learning rate of Infomax (that for views "
-        "in 0..1) are not known to us.",
-        "The control draws a random heading for each different view and meets the same one where it sees the same view again.",
-    ),
-    measures=measures,
-    exhibits=(
-        Exhibit(
-            name="by-displacement", title="Errors by displacement", table="by_displacement",
-            caption="Mean errors a walk, over all routes and both sides, by how far beside the route the walk began.",
-        ),
-        Exhibit(
-            name="errors", title="Errors against displacement", table="walks",
-            caption="Mean errors a walk; bars are standard errors of the mean.",
-            draw=lambda walks: curves(walks, "displacement_cm", "errors", "displacement of the start (cm)", "errors a walk"),
-        ),
-        Exhibit(
-            name="by-model", title="Errors of all walks", table="by_model",
-            caption="Over all routes and displacements. Arrived: share of the walks that arrived within 1,000 steps; the others count with "
-            "the errors that they had made by then.",
-        ),
-        Exhibit(
-            name="boxes", title="Errors of each model, as in figure 4D of the paper", table="walks",
-            caption="Median, quartiles, least and most of all walks.", draw=lambda walks: boxes(walks, "errors", "errors a walk"),
-        ),
-        Exhibit(
-            name="by-route", title="Errors by route", table="by_route", caption="Mean errors a walk, over all displacements.",
-        ),
-    ),
-)  # fmt: skip
+    quick_axes={"start_offset": _starts(0.05, 0.15, 0.25)},
+    parameters=PARAMETERS,
+    differences=DIFFERENCES,
+    measure=measure,
+    claims=CLAIMS,
+    items=ITEMS,
+)

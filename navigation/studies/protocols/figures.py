@@ -1,57 +1,74 @@
-"""The figures of the protocols' reports, from tables of walks."""
+"""Figures of tables of walks, one line or box per model."""
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ...reports.plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR
-from ..thesis.drawing import GOOD_COLOUR, SOFT_COLOUR, canvas
-from .protocol import by_model
+from ...reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, canvas
+from .protocol import models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
-MARKS = "osD^v"
+MARKERS = "osD^v"
 
 
-def curves(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str, *, equal: bool = False) -> Figure:
-    """The mean of y against x, a line a model, with standard errors. equal: draw where both are equal (x and y in the same unit)."""
+def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str, *, diagonal: bool = False) -> Figure:
+    """The mean of one column against another, one line per model, with standard errors.
+
+    Args:
+        walks: One walk per row, with a column "model".
+        x: Column of the horizontal axis.
+        y: Column of the vertical axis.
+        xlabel: Label of the horizontal axis.
+        ylabel: Label of the vertical axis.
+        diagonal: Also draw where x equals y, which are then in one unit.
+
+    Returns:
+        The figure.
+    """
     figure, axes = canvas((7.2, 3.4))
-    for model, colour, mark in zip(by_model(walks), COLOURS, MARKS, strict=False):
+    axis = axes[0, 0]
+    for model, colour, marker in zip(models_in(walks), COLOURS, MARKERS, strict=False):
         grouped = walks[walks["model"] == model].groupby(x)[y]
         mean, error = grouped.mean().astype(float), grouped.sem().fillna(0).astype(float)
-        axes[0, 0].errorbar(
+        axis.errorbar(
             mean.index.to_numpy(float),
             mean,
             yerr=error,
-            fmt=f"-{mark}",
+            fmt=f"-{marker}",
             color=colour,
             label=model,
             ms=5,
             lw=1.6,
             capsize=2,
         )
-    if equal:
+    if diagonal:
         ends = np.array([0.0, walks[x].max()])
-        axes[0, 0].plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")
-    axes[0, 0].set(xlabel=xlabel, ylabel=ylabel)
-    axes[0, 0].set_ylim(bottom=0)
-    axes[0, 0].grid(axis="y", color="#00000018")
-    axes[0, 0].legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0, 1))
+        axis.plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")
+    axis.set(xlabel=xlabel, ylabel=ylabel)
+    axis.set_ylim(bottom=0)
+    axis.grid(axis="y", color="#00000018")
+    axis.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0, 1))
     return figure
 
 
-def boxes(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
-    """Median, quartiles, least and most of y, a box a model."""
-    models = by_model(walks)
+def boxes_by_model(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
+    """Median, quartiles, lowest and highest value of a column, one box per model. walks: one walk per row."""
+    models = models_in(walks)
     figure, axes = canvas((7.2, 3.0))
-    drawn = axes[0, 0].boxplot(
-        [walks.loc[walks["model"] == model, y].dropna().to_numpy(float) for model in models], whis=(0, 100), widths=0.5,
-        patch_artist=True, tick_labels=models, medianprops={"lw": 1.8},
-    )  # fmt: skip
-    for k, (box, median) in enumerate(zip(drawn["boxes"], drawn["medians"], strict=True)):
+    axis = axes[0, 0]
+    drawn = axis.boxplot(
+        [walks.loc[walks["model"] == model, y].dropna().to_numpy(float) for model in models],
+        whis=(0, 100),
+        widths=0.5,
+        patch_artist=True,
+        tick_labels=models,
+        medianprops={"lw": 1.8},
+    )
+    for k, (box, middle) in enumerate(zip(drawn["boxes"], drawn["medians"], strict=True)):
         colour = COLOURS[k % len(COLOURS)]
         box.set(facecolor=colour + "33", edgecolor=colour)
-        median.set_color(colour)
-    axes[0, 0].set_ylabel(ylabel)
-    axes[0, 0].set_ylim(bottom=0)
-    axes[0, 0].grid(axis="y", color="#00000018")
+        middle.set_color(colour)
+    axis.set_ylabel(ylabel)
+    axis.set_ylim(bottom=0)
+    axis.grid(axis="y", color="#00000018")
     return figure

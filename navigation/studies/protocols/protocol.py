@@ -1,22 +1,31 @@
-"""A published experiment: the runs it asks for, what was published, and how its numbers come from the runs."""
+"""What a published experiment is: its runs, its published parameters, and how its numbers follow from the runs."""
 
 from collections import Counter
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
+from matplotlib.figure import Figure
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
+from tussock.world.settings import settings, whole
 
-from ...reports.findings import Findings
-from ...sweeps.spec import Choice, Sweep
+from ...experiment import Experiment
+from ...reports.claims import Claim
+from ...reports.results import StudyResults
+from ...sweeps.spec import Change, Sweep
 
 
-@dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """A setting of the original, as published, and what it is here; the same words where it is the same."""
+class Parameter(NamedTuple):
+    """A parameter of the original experiment.
+
+    Attributes:
+        name: Its name in the report.
+        published: Its published value, in words.
+        here: Its value here; the same words where it is the same.
+    """
 
     name: str
     published: str
@@ -24,76 +33,123 @@ class Parameter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Exhibit:
-    """A table or figure of the report.
+class Item:
+    """A figure or table of the report.
 
-    name: of files and anchors. table: of the findings. draw: makes a figure of that table; None shows its rows.
+    Attributes:
+        name: Name of its files and of its anchor in the page.
+        title: Heading.
+        caption: Text below a figure or above a table.
+        table: Name of a table of the results.
+        draw: Draws a figure of that table; without it, the item is the table.
     """
 
     name: str
     title: str
     caption: str
     table: str
-    draw: Callable[[pd.DataFrame], Any] | None = None
+    draw: Callable[[pd.DataFrame], Figure] | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@settings
 class Protocol:
-    """An experiment that others published, to be done again.
+    """A published experiment.
 
-    name: as the command line has it. paper: in full. question: in a sentence. settings: of all runs. axes: what varies beside the
-    world and route. world, worlds: the generated worlds that it takes where none is given, a route each. quick_worlds, quick_axes: a
-    first look. parameters: published ones beside ours. differences: from the original, in sentences. of_walk: numbers of a walk, from
-    its row and its steps, added to its row. measures: what all walks together say; exhibits: of that.
+    Attributes:
+        name: Its name on the command line.
+        title: Title of the report.
+        paper: The paper, as in a list of references.
+        question: What the experiment asks, in a sentence.
+        experiment: What all runs share.
+        axes: What varies between runs besides the world and route: by name, the choices, as `Experiment.replace` takes them. One of
+            them is "model".
+        worlds: Number of worlds, with one route each, where none is given.
+        quick_worlds: The same for a first look.
+        quick_axes: Axes that have fewer choices in a first look.
+        parameters: Published parameters.
+        differences: Differences from the original, one sentence each.
+        measure: Computes the results from a table of walks, with the columns of a sweep's table and those of `of_walk`. "model" has
+            the model's name without parameters, "place" the name of the route.
+        claims: Claims of the paper that the results test. The figure of each is the name of an item.
+        items: Figures and tables of the report.
+        of_walk: Computes further columns for a walk, from its row of the table and its steps.
+        world: World preset where none is given.
     """
 
     name: str
     title: str
     paper: str
     question: str
-    settings: Choice
-    axes: dict[str, list[Choice]]
-    worlds: int
-    quick_worlds: int
-    quick_axes: dict[str, list[Choice]]
+    experiment: Experiment
+    axes: dict[str, list[Change]]
+    worlds: int = whole()
+    quick_worlds: int = whole()
+    quick_axes: dict[str, list[Change]]
     parameters: tuple[Parameter, ...]
     differences: tuple[str, ...]
-    measures: Callable[[pd.DataFrame], Findings]
-    exhibits: tuple[Exhibit, ...]
-    of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = field(default=lambda row, steps: {})
+    measure: Callable[[pd.DataFrame], StudyResults]
+    claims: tuple[Claim, ...]
+    items: tuple[Item, ...]
+    of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = lambda row, steps: {}
     world: str = "tussock-field"
 
-    def sweep(self, places: "list[Choice]", *, quick: bool = False) -> Sweep:
-        """The runs: each choice of the axes at each place. quick: fewer choices, where the protocol says which."""
+    def __attrs_post_init__(self) -> None:
+        names = [item.name for item in self.items]
+        if "model" not in self.axes:
+            raise SettingError(f'protocol {self.name!r} has no axis "model"; give one, with at least one model')
+        for claim in self.claims:
+            if claim.figure not in names:
+                raise SettingError(
+                    f"protocol {self.name!r}: claim {claim.key!r} is shown by {claim.figure!r}; give one of its items: {', '.join(names)}"
+                )
+
+    def sweep(self, routes: list[Change], *, quick: bool = False, **changes: Any) -> Sweep:
+        """The runs: one for each combination of the axes, on each route.
+
+        Args:
+            routes: Worlds with one route each; see `routes_in`.
+            quick: A first look.
+            changes: Of the experiment, for all runs.
+        """
         axes = self.axes | (self.quick_axes if quick else {})
-        return Sweep(title=self.title, fixed=self.settings, axes={"place": places} | axes)
+        return Sweep.over(self.title, self.experiment.replace(threads=1, **changes), {"route": routes} | axes)
 
 
-def places(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) -> list[Choice]:
-    """Worlds with a route each: given routes through one world, or `count` generated ones, of the seeds from `seed` on."""
+def routes_in(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) -> list[Change]:
+    """Worlds with one route each, as choices of an axis.
+
+    Args:
+        world: A world preset or file.
+        routes: Route files, all in the world of `seed`.
+        seed: First seed of the worlds and routes that are generated.
+        count: Number of these, where there are no route files.
+
+    Returns:
+        The world and route of an experiment, for each route.
+    """
     if Path(world).is_file():
-        world = str(Path(world).resolve())  # found from everywhere
+        world = str(Path(world).resolve())  # so that workers in other folders find it
     if routes:
-        found = [route.resolve() if route.is_file() else route for route in routes]
-        return [{"world": world, "world_seed": seed, "route": route} for route in found]
+        paths = [route.resolve() if route.is_file() else route for route in routes]
+        return [{"world": world, "world_seed": seed, "route": path} for path in paths]
     return [{"world": world, "world_seed": each, "route_seed": each} for each in range(seed, seed + count)]
 
 
-def place_names(rows: Collection[dict[str, Any]]) -> list[str]:
-    """What a report calls the place of each run: the name of the route's file, in full where several have it."""
-    routes = [row["route"] for row in rows]
-    stems = Counter(Path(route).stem for route in {each for each in routes if each})
-    short = {route: Path(route).stem if stems[Path(route).stem] == 1 else route for route in routes if route}
-    return [short[route] if route else f"route {row['route_seed']}" for route, row in zip(routes, rows, strict=True)]
+def route_names(rows: Collection[dict[str, Any]]) -> list[str]:
+    """The name of each run's route in a report: its file's name, with the folder where several files have the same name."""
+    routes = {row["route"] for row in rows if row["route"]}
+    stems = Counter(Path(route).stem for route in routes)
+    names = {route: Path(route).stem if stems[Path(route).stem] == 1 else route for route in routes}
+    return [names.get(row["route"]) or f"route {row['route_seed']}" for row in rows]
 
 
-def by_model(walks: pd.DataFrame) -> list[str]:
-    """The models of a table of walks, in the order in which they stand in it."""
+def models_in(walks: pd.DataFrame) -> list[str]:
+    """The models of a table of walks, in their order in the table."""
     return list(dict.fromkeys(walks["model"]))
 
 
-def check_walked(walks: pd.DataFrame, models: list[str]) -> None:
-    """Refuse to judge a protocol of which a model did not walk at all. Raises InputError."""
+def check_models(walks: pd.DataFrame, models: list[str]) -> None:
+    """Refuse a table of walks in which a model has none. Raises SettingError."""
     for model in models:
         if model not in set(walks["model"]):
-            raise InputError(f"no walk with {model} could be made; the table of runs says why")
+            raise SettingError(f"no walk with {model} could be made; the column error of runs.parquet has the reasons")

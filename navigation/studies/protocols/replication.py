@@ -1,116 +1,194 @@
-"""Doing a protocol: its runs as a sweep in the folder of its report, and the report of them."""
+"""Doing a protocol: its runs are a sweep in the folder of its report."""
 
-import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from tussock.world.atomic import replacing
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
+from tussock.world.progress import Progress, no_progress
 
-from ...reports.findings import Claim, Findings, plain
-from ...reports.page import cell, page, picture
+from ...experiment_settings import key_of
+from ...reports.claims import Outcome, check_claims
+from ...reports.report import (
+    REPORT,
+    RESULTS,
+    Block,
+    Bullets,
+    ClaimTable,
+    Command,
+    Drawing,
+    Report,
+    Section,
+    Table,
+    Text,
+    write_report,
+)
+from ...reports.results import StudyResults
 from ...sweeps.spec import Sweep
 from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
-from ...sweeps.work import run_key
-from ..thesis.report import FIGURES, REPORT, RESULTS
-from .protocol import Exhibit, Protocol, check_walked, place_names
+from .protocol import Item, Protocol, check_models, route_names
+
+SUMMARY = (
+    "What the paper claims, the numbers that it gives where it gives any, the numbers obtained here, and whether the claim holds by the "
+    "test named. No parameter was tuned to make a claim hold."
+)
 
 
 def replicate(
-    protocol: Protocol, sweep: Sweep, out: Path, *, about: dict[str, Any], command: str, scheduler: str | None = None,
-    workers: int | None = None, progress: Callable[[int, int], object] = lambda done, total: None,
-) -> dict[str, Any]:  # fmt: skip
-    """Do the runs that the folder lacks and write its report; return what `tussock replicate` says.
+    protocol: Protocol,
+    sweep: Sweep,
+    out: Path,
+    *,
+    about: dict[str, Any],
+    command: str,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress = no_progress,
+) -> dict[str, Any]:
+    """Do the runs that a folder does not have yet, and write the report.
 
-    about: what it was done with, for the head of the report. command: that repeats it. Raises InputError as `run_sweep` does, and where a
-    model did not walk at all.
+    Args:
+        protocol: The experiment.
+        sweep: Its runs.
+        out: The folder.
+        about: The choices made, for the head of the report.
+        command: Command line that repeats all of it.
+        scheduler: Address of a Dask scheduler; see `run_sweep`.
+        workers: Number of workers on this machine; see `run_sweep`.
+        progress: Called with the numbers of finished and of all runs.
+
+    Returns:
+        The result of `tussock replicate`.
+
+    Raises:
+        SettingError: A model has no walk at all.
+        InputError: For the same reasons as `run_sweep`.
     """
     done = run_sweep(sweep, out, scheduler=scheduler, workers=workers, progress=progress)
     walks, left_out = walks_of(protocol, sweep, out)
-    found = protocol.measures(walks)
-    write_report(protocol, found, out, about=about, left_out=left_out, command=command)
+    results = protocol.measure(walks)
+    outcomes = check_claims(protocol.claims, [results])
+    write_report(_report(protocol, results, outcomes, about=about, left_out=left_out, command=command), out)
     return {
-        "report": str(out / REPORT), "results": str(out / RESULTS), "runs": done["runs"], "done_before": done["done_before"],
-        "could_not_run": done["could_not_run"], "claims": {each.key: {"holds": words(each)} for each in found.claims},
+        "report": str(out / REPORT),
+        "results": str(out / RESULTS),
+        "runs": done["runs"],
+        "done_before": done["done_before"],
+        "could_not_run": done["could_not_run"],
+        "claims": {each.claim.key: {"holds": each.label} for each in outcomes},
         "seconds": done["seconds"],
-    }  # fmt: skip
+    }
 
 
 def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame, dict[str, int]]:
-    """The walks of a sweep in a folder, a row each with the protocol's own numbers; and why others could not be made, how often."""
-    wanted = {run_key(run) for run in sweep.runs()}
+    """Read the walks of a protocol from its folder.
+
+    Args:
+        protocol: The experiment.
+        sweep: Its runs.
+        out: The folder.
+
+    Returns:
+        One row per walk, ordered by model, with the columns of the protocol's `of_walk`; and the number of runs that could not be
+        made, by the reason.
+
+    Raises:
+        SettingError: There is no walk at all, or none with one of the models.
+    """
+    keys = {key_of(run) for run in sweep.experiments}
     with Store(out, read_only=True) as store:
-        rows = {key: row for key, row in store.rows().items() if key in wanted}
-        for (key, row), place in zip(rows.items(), place_names(rows.values()), strict=True):
-            row["place"] = place
+        rows = {key: row for key, row in store.rows().items() if key in keys}
+        for (key, row), name in zip(rows.items(), route_names(rows.values()), strict=True):
+            row["place"] = name
             if row["error"] is None:
                 row |= protocol.of_walk(row, read_steps(store.steps(key)))
-    errors = [_kind(row["error"]) for row in rows.values() if row["error"] is not None]
-    if len(errors) == len(rows):
-        raise InputError(f"none of {len(rows)} runs could be made; the first: {errors[0]}")
+    reasons = [_kind_of(row["error"]) for row in rows.values() if row["error"] is not None]
+    if len(reasons) == len(rows):
+        raise SettingError(f"none of {len(rows)} runs could be made; the first: {reasons[0]}")
     table = table_of({key: row for key, row in rows.items() if row["error"] is None})
-    models = [choice["model"] for choice in sweep.axes["model"]]
-    check_walked(table, models)
+    models = list(dict.fromkeys(str(run.model) for run in sweep.experiments))
+    check_models(table, models)
     order = table["model"].map({model: k for k, model in enumerate(models)})
     table = table.iloc[order.argsort(kind="stable")].assign(model=lambda each: each["model"].str.split().str[0])
-    return table.reset_index(drop=True), {why: errors.count(why) for why in dict.fromkeys(errors)}
+    return table.reset_index(drop=True), {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
 
-def _kind(error: str) -> str:
-    """An error without what tells it from others of its kind: what stands in parentheses."""
+def _kind_of(error: str) -> str:
+    """An error without what differs between errors of one kind: the text in parentheses."""
     return re.sub(r" \([^()]*\)", "", error).replace(" m is", " is")
 
 
-def write_report(
-    protocol: Protocol, found: Findings, out: Path, *, about: dict[str, Any], left_out: dict[str, int], command: str
-) -> None:
-    """Write figures (PNG and SVG), results.json and report.html."""
-    (out / FIGURES).mkdir(parents=True, exist_ok=True)
-    results = {
-        "version": 1, "protocol": protocol.name, "paper": protocol.paper, "about": about,
-        "parameters": {each.name: {"published": each.published, "here": each.here} for each in protocol.parameters},
-        "differences": protocol.differences, "could_not_run": left_out, "numbers": found.numbers,
-        "claims": {
-            claim.key: {key: getattr(claim, key) for key in ("statement", "test", "note", "published", "obtained", "holds")}
-            for claim in found.claims
-        },
-        "tables": found.to_json()["tables"],
-    }  # fmt: skip
-    text = page(
-        "protocol.html", title=protocol.title, lead=protocol.question, about=about, paper=protocol.paper,
-        claims=[_shown(claim) for claim in found.claims], exhibits=[_exhibit(each, found, out / FIGURES) for each in protocol.exhibits],
-        parameters=protocol.parameters, differences=protocol.differences, left_out=left_out, command=command,
-    )  # fmt: skip
-    with replacing(out / RESULTS) as partial:
-        partial.write_text(json.dumps(plain(results), indent=1) + "\n", encoding="utf-8")
-    with replacing(out / REPORT) as partial:  # last: a folder with a report holds everything
-        partial.write_text(text, encoding="utf-8")
+def _report(
+    protocol: Protocol,
+    results: StudyResults,
+    outcomes: list[Outcome],
+    *,
+    about: dict[str, Any],
+    left_out: dict[str, int],
+    command: str,
+) -> Report:
+    links = {each.claim.key: (each.claim.figure, each.claim.figure.replace("-", " ")) for each in outcomes}
+    summary = [Text(SUMMARY), ClaimTable(outcomes=outcomes, links=links)]
+    shown: list[Block] = [_section(item, results.tables[item.table]) for item in protocol.items]
+    if left_out:
+        shown.append(Text("Runs that could not be made, and are in no number above:", anchor="could-not-run"))
+        shown.append(Bullets([f"{count}: {reason}" for reason, count in left_out.items()]))
+    parameters = Table(
+        columns=["Parameter", "Published", "Here"],
+        rows=[(each.name, each.published, each.here) for each in protocol.parameters],
+    )
+    again = Text("Finished runs are in the folder and are not done again. The same command gives the same numbers.")
+    return Report(
+        title=protocol.title,
+        lead=protocol.question,
+        about=about,
+        blocks=[
+            Section(title="Does it hold?", anchor="summary", blocks=summary),
+            Section(title="Results", anchor="results", blocks=shown),
+            Section(
+                title="Differences from the original",
+                anchor="differences",
+                blocks=[parameters, Bullets(protocol.differences)],
+            ),
+            Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
+        ],
+        footer=f"After {protocol.paper} All numbers are in results.json, every walk is in runs.parquet.",
+        results=_results(protocol, results, outcomes, about=about, left_out=left_out),
+    )
 
 
-def words(claim: Claim) -> str:
-    """Whether a claim holds, as people say it."""
-    return {None: "not tested", True: "holds", False: "does not hold"}[claim.holds]
+def _section(item: Item, table: pd.DataFrame) -> Section:
+    draw = item.draw
+    if draw is None:
+        return Section(title=item.title, anchor=item.name, blocks=[Table.of(table, item.caption)])
+    drawing = Drawing(names=(item.name,), draw=lambda: [draw(table)], alt=item.title, caption=item.caption)
+    return Section(title=item.title, anchor=item.name, blocks=[drawing])
 
 
-def _shown(claim: Claim) -> dict[str, Any]:
-    """What the page shows of a claim."""
-    labels = dict.fromkeys([*claim.published, *claim.obtained])
+def _results(
+    protocol: Protocol,
+    results: StudyResults,
+    outcomes: list[Outcome],
+    *,
+    about: dict[str, Any],
+    left_out: dict[str, int],
+) -> dict[str, Any]:
+    """Everything in numbers; docs/protocols.md explains it."""
     return {
-        "claim": claim, "numbers": [(label, claim.published.get(label), claim.obtained.get(label)) for label in labels],
-        "words": words(claim), "colour": {None: "untested", True: "yes", False: "no"}[claim.holds],
-    }  # fmt: skip
-
-
-def _exhibit(each: Exhibit, found: Findings, folder: Path) -> dict[str, Any]:
-    """What the page shows of a table or figure."""
-    table = found.tables[each.table]
-    shown = {"name": each.name, "title": each.title, "caption": each.caption}
-    if each.draw is not None:
-        return shown | picture(each.draw(table), folder, each.name)
-    rows = [[cell(plain(value)) for value in row] for row in table.to_numpy(dtype=object)]
-    return shown | {"columns": list(table.columns), "rows": rows}
+        "version": 1,
+        "protocol": protocol.name,
+        "paper": protocol.paper,
+        "about": about,
+        "parameters": {each.name: {"published": each.published, "here": each.here} for each in protocol.parameters},
+        "differences": protocol.differences,
+        "could_not_run": left_out,
+        "numbers": results.numbers,
+        "claims": {
+            each.claim.key: each.description | {"obtained": each.obtained[0], "holds": each.holds[0]}
+            for each in outcomes
+        },
+        "tables": results.to_json()["tables"],
+    }

@@ -1,1 +1,1 @@
-"""The studies of the thesis, as functions from panoramas to tables; pictures and the report are drawn from the tables alone."""
+"""The studies of the thesis: functions from views to tables and numbers. Figures and the report follow from these alone."""

@@ -1,6 +1,7 @@
-"""Study 8: the thesis's three open problems, the full scan, the corners and the choice of features, with what the project has now."""
+"""Study 8: the thesis's three open problems (the full scan, corners, the choice of features) with today's models."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -8,101 +9,111 @@ import pandas as pd
 from ...encoding import Encoding
 from ...models import make_model
 from ...models.base import Model
-from ...reports.findings import Claim, Findings
+from ...reports.claims import Claim, Decision
+from ...reports.results import StudyResults
 from . import published
 from .classifier import learned_views
 from .corners import corner_views, differences, equally_different
 from .headings import errors_of, headings
-from .material import Material
-from .settings import ENCODING, Settings
+from .parameters import ENCODING, Progress, StudySettings
+from .study_data import StudyData
 
-EDGES = Encoding.named("edges", resize=6)
+ENCODINGS = {"grey": ENCODING, "edges": Encoding.named("edges", resize=6)}
 
 
-def study(material: Material, settings: Settings, progress=lambda done, total: None) -> Findings:
-    """Heading errors over the full circle of other networks, features and choices of views, step by step from the thesis's own."""
-    learned = learned_views(material)
-    choices = {
+class Variant(NamedTuple):
+    """A model to test.
+
+    Attributes:
+        problem: The open problem that it addresses.
+        model: Name of the model.
+        make: Makes the model from a seed.
+        encoding: Key of ENCODINGS.
+        views: Name of the selection of views that it learns.
+    """
+
+    problem: str
+    model: str
+    make: Callable[[int], Model]
+    encoding: str
+    views: str
+
+
+def study(data: StudyData, settings: StudySettings, progress: Progress) -> StudyResults:
+    """Heading errors over the full circle with other networks, features and selections of views, in steps from the thesis's own."""
+    learned = learned_views(data)
+    selections = {
         "every 6th": learned,
-        "equally different": equally_different(differences(material, 1), len(learned)),
-        "every 2nd": np.arange(0, len(material.route.poses), 2),
+        "equally different": equally_different(differences(data, 1), len(learned)),
+        "every 2nd": np.arange(0, len(data.route.poses), 2),
     }
-    encodings = {"grey": ENCODING, "edges": EDGES}
-    images = {
-        name: (encoding(material.route_views), encoding(material.place_views)) for name, encoding in encodings.items()
-    }
-    in_corner = np.isin(material.nearest[material.near], corner_views(material.route))
-    rows, tables = [], {}
-    runs = _runs(settings)
-    for done, (problem, name, make, encoding, choice) in enumerate(runs):
-        views, places = images[encoding]
-        table = headings(material, make(settings.seeds[0]).fit(views[choices[choice]]), places)
+    images = {name: (encoding(data.route_views), encoding(data.grid_views)) for name, encoding in ENCODINGS.items()}
+    in_corner = np.isin(data.nearest[data.near], corner_views(data.route))
+    rows, tables, variants = [], {}, _variants(settings)
+    for done, (problem, name, make, encoding, views) in enumerate(variants):
+        route_images, grid_images = images[encoding]
+        selected = selections[views]
+        table = headings(data, make(settings.seeds[0]).fit(route_images[selected]), grid_images)
         rows.append(
             {
                 "problem": problem,
                 "model": name,
                 "encoding": encoding,
-                "views": choice,
-                "number_of_views": len(choices[choice]),
-            }
-            | errors_of(table)
-            | {
-                f"median_error_deg_{part}": float(table.loc[where, "error_deg"].median())
-                for part, where in (("corners", in_corner), ("straights", ~in_corner))
+                "views": views,
+                "number_of_views": len(selected),
+                **errors_of(table),
+                "median_error_deg_corners": float(table.loc[in_corner, "error_deg"].median()),
+                "median_error_deg_straights": float(table.loc[~in_corner, "error_deg"].median()),
             }
         )
-        tables[f"headings, {name}, {encoding}, {choice}"] = table
-        progress(done + 1, len(runs))
-    by_model = pd.DataFrame(rows)
-    return Findings(tables={"by_model": by_model} | tables, numbers={}, claims=_claims(by_model))
+        tables[f"headings, {name}, {encoding}, {views}"] = table
+        progress(done + 1, len(variants))
+    return StudyResults(tables={"by_model": pd.DataFrame(rows)} | tables, numbers={})
 
 
-Run = tuple[str, str, Callable[[int], Model], str, str]
-
-
-def _runs(settings: Settings) -> list[Run]:
-    """What is tried: the open problem, the model's name, how to make one from a seed, its encoding, and which views it learns."""
-
-    def thesis(seed: int) -> Model:
-        return make_model("mlp", **published.BEST_TUNINGS["whole_route"][2], max_iter=settings.iterations[1], seed=seed)
+def _variants(settings: StudySettings) -> list[Variant]:
+    """The models to test, from the thesis's own to all changes together."""
 
     def model(name: str, **parameters) -> Callable[[int], Model]:
         return lambda seed: make_model(name, seed=seed, **parameters)
 
+    thesis = model("mlp", **published.BEST_TUNINGS["whole_route"][2], max_iter=settings.iterations[1])
     steps = {"steps": 200} if settings.quick else {}
-    rotation, network = model("mlp-rotation", **steps), "mlp-rotation"
+    rotation, mixture = model("mlp-rotation", **steps), model("mlp-mixture", **steps)
     return [
-        ("the thesis", "mlp", thesis, "grey", "every 6th"),
-        ("full scans", network, rotation, "grey", "every 6th"),
-        ("feature selection", "mlp", thesis, "edges", "every 6th"),
-        ("feature selection", "adaboost", model("adaboost"), "grey", "every 6th"),
-        ("feature selection", network, rotation, "edges", "every 6th"),
-        ("corners", network, rotation, "edges", "equally different"),
-        ("several networks", "mlp-mixture", model("mlp-mixture", **steps), "edges", "every 6th"),
-        ("all together", network, rotation, "edges", "every 2nd"),
-        ("all together", "perfect-memory", model("perfect-memory"), "edges", "every 2nd"),
+        Variant("the thesis", "mlp", thesis, "grey", "every 6th"),
+        Variant("full scans", "mlp-rotation", rotation, "grey", "every 6th"),
+        Variant("feature selection", "mlp", thesis, "edges", "every 6th"),
+        Variant("feature selection", "adaboost", model("adaboost"), "grey", "every 6th"),
+        Variant("feature selection", "mlp-rotation", rotation, "edges", "every 6th"),
+        Variant("corners", "mlp-rotation", rotation, "edges", "equally different"),
+        Variant("several networks", "mlp-mixture", mixture, "edges", "every 6th"),
+        Variant("all together", "mlp-rotation", rotation, "edges", "every 2nd"),
+        Variant("all together", "perfect-memory", model("perfect-memory"), "edges", "every 2nd"),
     ]
 
 
-def _claims(by_model: pd.DataFrame) -> list[Claim]:
-    like_it = (
-        (by_model["model"] == "mlp-rotation") & (by_model["encoding"] == "edges") & (by_model["views"] == "every 6th")
-    )
-    first, last = by_model.iloc[0], by_model[like_it].iloc[0]
-    return [
-        Claim(
-            key="full-scan-solved",
-            figure="beyond",
-            statement="Beyond the thesis: a network as large, taught all rotations of the edges in the same views, recovers headings "
-            "over the full circle.",
-            published={"median error of its classifier (deg)": published.SCAN_MEDIAN_DEG[360]},
-            obtained={
-                "median error of its classifier (deg)": float(first["median_error_deg"]),
-                "of mlp-rotation (deg)": float(last["median_error_deg"]),
-                "in corners, classifier (deg)": float(first["median_error_deg_corners"]),
-                "in corners, mlp-rotation (deg)": float(last["median_error_deg_corners"]),
-            },
-            test="its median error over 360 degrees is under 10, and lower than the classifier's",
-            holds=bool(last["median_error_deg"] < 10 and last["median_error_deg"] < first["median_error_deg"]),
-        ),
-    ]
+def _full_scan(results: StudyResults) -> Decision:
+    rows = results.tables["by_model"].set_index(["model", "encoding", "views"])
+    classifier, rotation = rows.loc["mlp", "grey", "every 6th"], rows.loc["mlp-rotation", "edges", "every 6th"]
+    obtained = {
+        "median error of its classifier (deg)": float(classifier["median_error_deg"]),
+        "of mlp-rotation (deg)": float(rotation["median_error_deg"]),
+        "in corners, classifier (deg)": float(classifier["median_error_deg_corners"]),
+        "in corners, mlp-rotation (deg)": float(rotation["median_error_deg_corners"]),
+    }
+    median = rotation["median_error_deg"]
+    return Decision(obtained, bool(median < 10 and median < classifier["median_error_deg"]))
+
+
+CLAIMS = (
+    Claim(
+        key="full-scan-solved",
+        figure="beyond",
+        statement="Beyond the thesis: a network of the same size that is trained on all rotations of the edges in the same views "
+        "recovers headings over the full circle.",
+        test="its median error over 360 degrees is under 10, and lower than the classifier's",
+        published={"median error of its classifier (deg)": published.SCAN_MEDIAN_DEG[360]},
+        decide=_full_scan,
+    ),
+)

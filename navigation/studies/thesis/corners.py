@@ -1,4 +1,4 @@
-"""Study 6: corners (section 4.4.7, figures 29 to 32, appendix 7.6), and choosing views by how much they differ."""
+"""Study 6: corners (section 4.4.7, figures 29 to 32, appendix 7.6), and views chosen by how much they differ."""
 
 import math
 from typing import Any
@@ -13,18 +13,20 @@ from tussock.world.geometry import Route
 from ...encoding import Encoding
 from ...evaluation import RECOVERED_DEG
 from ...failures import REACH
-from ...reports.findings import Claim, Findings
+from ...reports.claims import Claim, Decision
+from ...reports.results import StudyResults
 from . import published
-from .classifier import learned_views, train_and_test
+from .classifier import TrainedNetworks, learned_views, train_networks
 from .grid_search import best_tuning, search
-from .headings import middle
-from .material import Material
-from .settings import ENCODING, EVERY, Settings
+from .headings import median_of_medians
+from .parameters import ENCODING, EVERY, Progress, StudySettings
+from .study_data import StudyData
 
-SHARE = 0.2  # of the route at most: the part of it that turns the most is its corners ..
-LEAST = math.radians(10)  # .. where it turns this much
-MARGIN = 0.4  # m of straight route shown on both sides of the corners looked at
+SHARE = 0.2  # at most this share of the route is corners: the part that turns the most ..
+MIN_TURNING = math.radians(10)  # .. where it turns at least this much
+MARGIN = 0.4  # m of route on both sides of the corners in the section
 RAW = Encoding.parse("grey")
+EVERY_6TH, MORE_IN_CORNERS = "every 6th view", "twice as many in corners"
 
 
 def turning(route: Route) -> Float[np.ndarray, " n"]:
@@ -33,162 +35,181 @@ def turning(route: Route) -> Float[np.ndarray, " n"]:
 
 
 def corner_views(route: Route) -> Int[np.ndarray, " k"]:
-    """Indices of the route views in corners: the share of them where the route turns the most, and by no less than
-    LEAST; there may be none.
-    """
+    """Indices of the route views in corners: the SHARE of the route that turns the most, by at least MIN_TURNING. May be empty."""
     turned = turning(route)
     most = np.argsort(-turned, kind="stable")[: round(SHARE * len(turned))]
-    return np.sort(most[turned[most] >= LEAST])
+    return np.sort(most[turned[most] >= MIN_TURNING])
 
 
 def corner_section(route: Route) -> tuple[int, int]:
-    """First and last view of the part with the two neighbouring corners that turn the most, and MARGIN of straight around.
+    """First and last view of the section with the two neighbouring corners that turn the most, and MARGIN around them.
 
-    On a route without corners, the part around where it turns the most.
+    On a route without corners, the section around the point that turns the most.
     """
-    views = corner_views(route)
+    turned, views = turning(route), corner_views(route)
     if len(views) == 0:
-        views = turning(route).argmax(keepdims=True)
-    runs = np.split(views, np.flatnonzero(np.diff(views) > 1) + 1)
-    turned = turning(route)
-    weight = [turned[run].sum() for run in runs]
-    first = int(np.argmax(np.add(weight[:-1], weight[1:]))) if len(runs) > 1 else 0
-    arc = route.arc
-    low, high = arc[runs[first][0]] - MARGIN, arc[runs[min(first + 1, len(runs) - 1)][-1]] + MARGIN
-    inside = np.flatnonzero((arc >= low) & (arc <= high))
+        views = turned.argmax(keepdims=True)
+    corners = np.split(views, np.flatnonzero(np.diff(views) > 1) + 1)
+    weight = [turned[corner].sum() for corner in corners]
+    first = int(np.argmax(np.add(weight[:-1], weight[1:]))) if len(corners) > 1 else 0
+    last = min(first + 1, len(corners) - 1)
+    low, high = route.arc[corners[first][0]] - MARGIN, route.arc[corners[last][-1]] + MARGIN
+    inside = np.flatnonzero((route.arc >= low) & (route.arc <= high))
     return int(inside[0]), int(inside[-1])
 
 
-def study(
-    material: Material, settings: Settings, progress=lambda done, total: None, *, tuning: dict[str, Any]
-) -> Findings:
-    """How fast views change, and what more of them in corners do. tuning: what the search on the whole route found best."""
-    views, places = ENCODING(material.route_views), ENCODING(material.place_views)
-    section = corner_section(material.route)
-    selections = _selections(material, section)
-    in_corner = np.isin(material.nearest[material.near], corner_views(material.route))
-    in_section = _between(material.nearest[material.near], section)
-    tuned = search("more_in_corners", views[selections["twice as many in corners"]], settings, progress)
-    tables: dict[str, pd.DataFrame] = {"change": _change(material), "search": tuned}
-    rows, runs = [], [(name, learned, tuning) for name, learned in selections.items()]
-    runs.append(("twice as many in corners, tuned anew", selections["twice as many in corners"], best_tuning(tuned)))
+def study(data: StudyData, settings: StudySettings, progress: Progress, *, tuning: dict[str, Any]) -> StudyResults:
+    """How fast views change, and how much more views in corners help. tuning: the best one for the whole route."""
+    route_images, grid_images = ENCODING(data.route_views), ENCODING(data.grid_views)
+    section = corner_section(data.route)
+    selections = _selections(data, section)
+    near = data.nearest[data.near]
+    where = {"in_corner": np.isin(near, corner_views(data.route)), "in_section": _between(near, section)}
+    tuned = search("more_in_corners", route_images[selections[MORE_IN_CORNERS]], settings, progress)
+    runs = [(name, learned, tuning) for name, learned in selections.items()]
+    runs.append((f"{MORE_IN_CORNERS}, tuned anew", selections[MORE_IN_CORNERS], best_tuning(tuned)))
+    tables: dict[str, pd.DataFrame] = {"change": _change(data), "search": tuned}
+    rows = []
     for name, learned, parameters in runs:
-        networks, shown, every_start = train_and_test(
-            material, views, places, learned, material.near, parameters, settings
-        )
-        tables[f"headings, {name}"] = shown["headings"].assign(in_corner=in_corner, in_section=in_section)
-        parts = {"corners": in_corner, "straights": ~in_corner, "section": in_section}
-        medians = {f"median_error_deg_{part}": middle(every_start, where) for part, where in parts.items()}
-        recovered = [int((table.loc[in_section, "error_deg"] < RECOVERED_DEG).sum()) for table in every_start]
-        rows.append({
-            "selection": name, "views": len(learned), "accuracy": networks["accuracy"].median(),
-            "median_error_deg": networks["median_error_deg"].median(), **medians, "places_in_section": int(in_section.sum()),
-            "recovered_in_section": float(np.median(recovered)),
-        })  # fmt: skip
-    tables |= {"by_selection": pd.DataFrame(rows), "selections": _table_of(material, selections)}
+        networks = train_networks(data, route_images, grid_images, learned, data.near, parameters, settings)
+        tables[f"headings, {name}"] = networks.headings.assign(**where)
+        rows.append({"selection": name, "views": len(learned)} | _numbers_of(networks, **where))
+    tables |= {"by_selection": pd.DataFrame(rows), "selections": _table_of_selections(data, selections)}
     numbers = {"section_first_view": section[0], "section_last_view": section[1], "corner_share": SHARE}
-    return Findings(tables=tables, numbers=numbers, claims=_claims(tables))
+    return StudyResults(tables=tables, numbers=numbers)
+
+
+def _numbers_of(networks: TrainedNetworks, in_corner: np.ndarray, in_section: np.ndarray) -> dict[str, float]:
+    tables = networks.all_headings
+    recovered = [int((table.loc[in_section, "error_deg"] < RECOVERED_DEG).sum()) for table in tables]
+    return {
+        "accuracy": networks.table["accuracy"].median(),
+        "median_error_deg": networks.table["median_error_deg"].median(),
+        "median_error_deg_corners": median_of_medians(tables, in_corner),
+        "median_error_deg_straights": median_of_medians(tables, ~in_corner),
+        "median_error_deg_section": median_of_medians(tables, in_section),
+        "places_in_section": int(in_section.sum()),
+        "recovered_in_section": float(np.median(recovered)),
+    }
 
 
 def _between(index: np.ndarray, section: tuple[int, int]) -> np.ndarray:
     return (index >= section[0]) & (index <= section[1])
 
 
-def _selections(material: Material, section: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Which route views are learned: the thesis's two choices, a control with as many more anywhere, and equal differences."""
-    learned = learned_views(material)
-    between = np.arange(0, len(material.route.poses), max(1, EVERY // 2))
-    corners = corner_views(material.route)
-    more = between[np.isin(between, corners) & _between(between, section)]
+def _selections(data: StudyData, section: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Which route views are learned: the thesis's two selections, and two controls."""
+    views, learned = len(data.route.poses), learned_views(data)
+    between = np.arange(0, views, max(1, EVERY // 2))
+    more = between[np.isin(between, corner_views(data.route)) & _between(between, section)]
     doubled = np.union1d(learned, more)
-    evenly = np.linspace(0, len(material.route.poses) - 1, len(doubled)).round().astype(int)
     return {
-        "every 6th view": learned,
-        "twice as many in corners": doubled,
-        "as many more, evenly": np.unique(evenly),
-        "as many, equally different": equally_different(differences(material, 1), len(learned)),
+        EVERY_6TH: learned,
+        MORE_IN_CORNERS: doubled,
+        "as many more, evenly": np.unique(np.linspace(0, views - 1, len(doubled)).round().astype(int)),
+        "as many, equally different": equally_different(differences(data, 1), len(learned)),
     }
 
 
-def differences(material: Material, every: int) -> Float[np.ndarray, " k"]:
-    """RMS difference (grey levels) between successive ones of every `every`-th route view."""
-    chosen = RAW(material.route_views[::every]).numpy()
-    return 255 * np.sqrt(np.square(np.diff(chosen, axis=0)).mean(axis=(1, 2)))
+def differences(data: StudyData, every: int) -> Float[np.ndarray, " k"]:
+    """RMS difference (grey levels) between successive views when every `every`-th route view is taken."""
+    views = RAW(data.route_views[::every]).numpy()
+    return 255 * np.sqrt(np.square(np.diff(views, axis=0)).mean(axis=(1, 2)))
 
 
 def equally_different(steps: Float[np.ndarray, " k"], views: int) -> Int[np.ndarray, " m"]:
-    """Indices of at most `views` views such that the differences summed up between successive ones are about equal.
+    """Choose views such that the sum of the differences from one to the next is about the same everywhere.
 
-    steps: difference from each view to the next.
+    Args:
+        steps: Difference from each view to the next.
+        views: Largest number of views to choose.
+
+    Returns:
+        Indices of the chosen views.
     """
     sums = np.r_[0.0, np.cumsum(steps)]
     return np.unique(np.searchsorted(sums, np.linspace(0, sums[-1], views) - 1e-9).clip(max=len(steps)))
 
 
-def _change(material: Material) -> pd.DataFrame:
+def _change(data: StudyData) -> pd.DataFrame:
     """How much successive learned views differ, where, and how much the route turns there (figure 30)."""
-    learned = learned_views(material)
+    learned = learned_views(data)
     middle = (learned[:-1] + learned[1:]) // 2
-    x, y = material.route.xy[middle].T
-    return pd.DataFrame({
-        "view": middle, "x_m": x, "y_m": y, "along_m": material.route.arc[middle], "rms": differences(material, EVERY),
-        "turning_deg": np.degrees(turning(material.route)[middle]), "in_corner": np.isin(middle, corner_views(material.route)),
-        "in_section": _between(middle, corner_section(material.route)),
-    })  # fmt: skip
+    columns = {
+        "view": middle,
+        "x_m": data.route.xy[middle, 0],
+        "y_m": data.route.xy[middle, 1],
+        "along_m": data.route.arc[middle],
+        "rms": differences(data, EVERY),
+        "turning_deg": np.degrees(turning(data.route)[middle]),
+        "in_corner": np.isin(middle, corner_views(data.route)),
+        "in_section": _between(middle, corner_section(data.route)),
+    }
+    return pd.DataFrame(columns)
 
 
-def _table_of(material: Material, selections: dict[str, np.ndarray]) -> pd.DataFrame:
+def _table_of_selections(data: StudyData, selections: dict[str, np.ndarray]) -> pd.DataFrame:
     """Every route view, and whether each selection has it."""
-    x, y, heading = material.route.poses.T
+    index = np.arange(len(data.route.poses))
+    x, y, heading = data.route.poses.T
     table = pd.DataFrame({"x_m": x, "y_m": y, "heading_deg": np.degrees(heading)})
-    for name, chosen in selections.items():
-        table[name] = np.isin(np.arange(len(table)), chosen)
-    return table.assign(in_corner=np.isin(np.arange(len(table)), corner_views(material.route)))
+    for name, selected in selections.items():
+        table[name] = np.isin(index, selected)
+    return table.assign(in_corner=np.isin(index, corner_views(data.route)))
 
 
-def _claims(tables: dict[str, pd.DataFrame]) -> list[Claim]:
-    change, by = tables["change"], tables["by_selection"]
+def _views_differ(results: StudyResults) -> Decision:
+    change = results.tables["change"].astype({"rms": "float32"})  # as views are
     rank = spearmanr(change["turning_deg"], change["rms"])
     corner, straight = (float(change.loc[change["in_corner"] == where, "rms"].median()) for where in (True, False))
-    plain, doubled = by.iloc[0], by.iloc[1]
-    share = [float(row["recovered_in_section"] / max(1, row["places_in_section"])) for row in (plain, doubled)]
-    beside = float(plain["median_error_deg_corners"])  # nan where there is no corner, or no place beside one
-    return [
-        Claim(
-            key="corners-change-faster",
-            figure="30",
-            statement="Successive views differ more in corners than on straights.",
-            published={},
-            obtained={
-                "RMS in corners (grey levels)": corner,
-                "on straights": straight,
-                "rank correlation with turning": float(rank.statistic),
-            },
-            test="the median difference is larger in corners, and its rank correlation with turning is positive (p < 0.05)",
-            holds=bool(corner > straight and rank.statistic > 0 and rank.pvalue < 0.05) if corner == corner else None,
-        ),
-        Claim(
-            key="worse-in-corners",
-            figure="32",
-            statement="The classifier of the whole route fails in corners more than on straights.",
-            published={},
-            obtained={
-                "median error in corners (deg)": beside,
-                "on straights": float(plain["median_error_deg_straights"]),
-            },
-            test="the median error is larger at places beside corners",
-            holds=bool(beside > plain["median_error_deg_straights"]) if beside == beside else None,
-        ),
-        Claim(
-            key="more-corner-views-help",
-            figure="32",
-            statement="Twice as many views in the corners recover more headings there.",
-            published={
-                "share recovered, every 6th view": published.RECOVERED_IN_CORNERS["every 6th view"],
-                "twice as many in corners": published.RECOVERED_IN_CORNERS["twice as many in corners"],
-            },
-            obtained={"share recovered, every 6th view": share[0], "twice as many in corners": share[1]},
-            test="more of the headings in the part looked at are less than 45 degrees off",
-            holds=share[1] > share[0] if int(plain["places_in_section"]) and int(change["in_corner"].sum()) else None,
-        ),
-    ]
+    obtained = {
+        "RMS in corners (grey levels)": corner,
+        "on straights": straight,
+        "rank correlation with turning": float(rank.statistic),
+    }
+    holds = bool(corner > straight and rank.statistic > 0 and rank.pvalue < 0.05)
+    return Decision(obtained, None if math.isnan(corner) else holds)
+
+
+def _worse_in_corners(results: StudyResults) -> Decision:
+    every_6th = results.tables["by_selection"].iloc[0]
+    corner, straight = (float(every_6th[f"median_error_deg_{part}"]) for part in ("corners", "straights"))
+    obtained = {"median error in corners (deg)": corner, "on straights": straight}
+    return Decision(obtained, None if math.isnan(corner) else corner > straight)
+
+
+def _more_views_help(results: StudyResults) -> Decision:
+    rows = results.tables["by_selection"].iloc[:2]
+    share = [float(row.recovered_in_section / max(1, row.places_in_section)) for row in rows.itertuples()]
+    testable = int(rows["places_in_section"].iloc[0]) and int(results.tables["change"]["in_corner"].sum())
+    obtained = {f"share recovered, {EVERY_6TH}": share[0], MORE_IN_CORNERS: share[1]}
+    return Decision(obtained, share[1] > share[0] if testable else None)
+
+
+CLAIMS = (
+    Claim(
+        key="corners-change-faster",
+        figure="30",
+        statement="Successive views differ more in corners than on straights.",
+        test="the median difference is larger in corners, and its rank correlation with turning is positive (p < 0.05)",
+        decide=_views_differ,
+    ),
+    Claim(
+        key="worse-in-corners",
+        figure="32",
+        statement="The classifier of the whole route fails in corners more than on straights.",
+        test="the median error is larger at positions near corners",
+        decide=_worse_in_corners,
+    ),
+    Claim(
+        key="more-corner-views-help",
+        figure="32",
+        statement="Twice as many views in the corners recover more headings there.",
+        test="more of the headings in the section are less than 45 degrees off",
+        published={
+            f"share recovered, {EVERY_6TH}": published.RECOVERED_IN_CORNERS[EVERY_6TH],
+            MORE_IN_CORNERS: published.RECOVERED_IN_CORNERS[MORE_IN_CORNERS],
+        },
+        decide=_more_views_help,
+    ),
+)

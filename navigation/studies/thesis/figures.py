@@ -1,10 +1,5 @@
-"""The figures of the thesis, in its order."""
+"""All figures of the thesis's report, in the order of the thesis."""
 
 from . import figures_confidence, figures_memory, figures_networks, figures_views
-from .pictures import PICTURES as _DRAWN
-from .pictures import Picture
 
-__all__ = ["PICTURES", "Picture"]
-
-_FILES = [each.__name__ for each in (figures_views, figures_memory, figures_networks, figures_confidence)]
-PICTURES = sorted(_DRAWN, key=lambda picture: _FILES.index(picture.draw.__module__))
+FIGURES = (*figures_views.FIGURES, *figures_memory.FIGURES, *figures_networks.FIGURES, *figures_confidence.FIGURES)

@@ -1,118 +1,128 @@
-"""Figures of perfect memory: frequency, resolution and preprocessing. Drawn from findings alone."""
+"""Figures of perfect memory: frequency, resolution and preprocessing."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...reports.findings import Findings
-from ...reports.plots import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR
-from .drawing import GOOD_COLOUR, SOFT_COLOUR, WIDE, boxes, canvas, diagrams, draw_route, lines, panorama, plan, plans
-from .material import Material
-from .pictures import picture
-from .settings import ENCODING
-
-
-@picture(
-    "12", "frequency", "Headings along the route, perfect memory",
-    "Recovered headings at the {places} grid places within 0.2 m of the route, every route view remembered.",
-)  # fmt: skip
-def _perfect_memory(found: Findings, material: Material) -> Figure:
-    return diagrams(found.tables, material.route, material.world, {"headings": ""})
-
-
-@picture(
-    "13",
-    "frequency",
-    "Place recognition",
-    "Each grid place is compared with the route view nearest to it; its heading is the set one.",
+from ...reports.drawing import (
+    CURVE_COLOUR,
+    GOOD_COLOUR,
+    PATH_COLOUR,
+    ROUTE_COLOUR,
+    SOFT_COLOUR,
+    WIDE,
+    canvas,
+    draw_error_boxes,
+    draw_lines,
+    draw_panorama,
 )
-def _place_recognition(found: Findings, material: Material) -> Figure:
-    figure, axes = plans(material.route.xy)
-    axis, table = axes[0, 0], found.tables["headings"]
-    draw_route(axis, material.route)
-    nearest = material.route.xy[table["nearest_view"]]
-    xy = table[["x_m", "y_m"]].to_numpy()
-    axis.plot(*np.stack([xy, nearest], axis=1).T, color=SOFT_COLOUR, lw=0.9, zorder=1)
-    axis.plot(*xy.T, "o", ms=3, color=CURVE_COLOUR)
-    plan(axis, material.world, np.vstack([xy, nearest]))
-    return figure
+from ...reports.maps import draw_map, draw_route, map_axes
+from ...reports.results import StudyResults
+from .heading_maps import heading_maps
+from .items import figure
+from .parameters import ENCODING
+from .study_data import StudyData
+
+EVERY_NTH = "N: every N-th view is remembered"
 
 
-@picture(
-    "14",
-    "frequency",
-    "Error against how many views are remembered",
-    "One route view in so many is remembered. Median and mean error.",
-)
-def _by_frequency(found: Findings, material: Material) -> Figure:
-    figure, axes = canvas()
-    table = found.tables["by_frequency"]
-    lines(axes[0, 0], table["every"], {
-        "median": (table["median_error_deg"], ROUTE_COLOUR, "o-"), "mean": (table["mean_error_deg"], PATH_COLOUR, "s-"),
-    })  # fmt: skip
-    axes[0, 0].set_xlabel("one view in so many is remembered")
-    return figure
+@figure("12", "frequency", "Headings along the route, perfect memory")
+def _perfect_memory(results: StudyResults, data: StudyData) -> Figure:
+    """Recovered headings at the {places} grid positions within 0.2 m of the route; every route view is remembered."""
+    return heading_maps(results.tables, data, {"headings": ""})
 
 
-@picture(
-    "15, 7.2", "frequency", "The same, as box plots",
-    "Quartiles (boxes), values within 1.5 boxes of them (whiskers), medians (lines) and means (dots).",
-)  # fmt: skip
-def _frequency_boxes(found: Findings, material: Material) -> Figure:
-    figure, axes = canvas()
-    boxes(axes[0, 0], found.tables["by_frequency"], "every")
-    axes[0, 0].set(
-        xlabel="one view in so many is remembered", ylabel="error (degrees)", ylim=(0, 180), yticks=range(0, 181, 45)
-    )
-    return figure
+@figure("13", "frequency", "Place recognition")
+def _place_recognition(results: StudyResults, data: StudyData) -> Figure:
+    """Each grid position is compared with the route view nearest to it; the heading of that view is the set heading."""
+    drawn, axes = map_axes(data.route.xy)
+    axis, table = axes[0, 0], results.tables["headings"]
+    draw_route(axis, data.route)
+    nearest = data.route.xy[table["nearest_view"]]
+    positions = table[["x_m", "y_m"]].to_numpy()
+    axis.plot(*np.stack([positions, nearest], axis=1).T, color=SOFT_COLOUR, lw=0.9, zorder=1)
+    axis.plot(*positions.T, "o", ms=3, color=CURVE_COLOUR)
+    draw_map(axis, data.world, np.vstack([positions, nearest]))
+    return drawn
 
 
-@picture(
-    "16", "resolution", "Error against the resize factor",
-    """Median error when views are sampled, as cv2.resize does by default (with and without Gaussian smoothing of {smoothing_px:g} pixels
-    before), when they are averaged instead, and the thesis's numbers (dashed).""",
-)  # fmt: skip
-def _by_factor(found: Findings, material: Material) -> Figure:
-    figure, axes = canvas()
-    table = found.tables["by_factor"]
+@figure("14", "frequency", "Error against the spacing of the remembered views")
+def _by_frequency(results: StudyResults, data: StudyData) -> Figure:
+    """Median and mean error when every N-th route view is remembered."""
+    drawn, axes = canvas()
+    table = results.tables["by_frequency"]
+    curves = {
+        "median": (table["median_error_deg"], ROUTE_COLOUR, "o-"),
+        "mean": (table["mean_error_deg"], PATH_COLOUR, "s-"),
+    }
+    draw_lines(axes[0, 0], table["every"], curves)
+    axes[0, 0].set_xlabel(EVERY_NTH)
+    return drawn
+
+
+@figure("15, 7.2", "frequency", "The same as box plots")
+def _frequency_boxes(results: StudyResults, data: StudyData) -> Figure:
+    """Quartiles (boxes), values within 1.5 box lengths of them (whiskers), medians (lines) and means (dots)."""
+    drawn, axes = canvas()
+    draw_error_boxes(axes[0, 0], results.tables["by_frequency"], "every")
+    _label_errors(axes[0, 0], EVERY_NTH)
+    return drawn
+
+
+@figure("16", "resolution", "Error against the resize factor")
+def _by_factor(results: StudyResults, data: StudyData) -> Figure:
+    """Median error when views are sampled, as cv2.resize does by default (with and without Gaussian smoothing of {smoothing_px:g}
+    pixels before), when they are averaged instead, and the thesis's numbers (dashed)."""
+    drawn, axes = canvas()
+    axis, table = axes[0, 0], results.tables["by_factor"]
     for smoothed, colour, name in ((False, PATH_COLOUR, "sampled"), (True, ROUTE_COLOUR, "sampled, smoothed")):
         rows = table[(table["resizing"] == "sampled") & (table["smoothed"] == smoothed)]
-        axes[0, 0].plot(
-            rows["factor"], rows["published_median_error_deg"], "--", color=colour, lw=1, label=f"{name} (thesis)"
-        )
-        lines(axes[0, 0], rows["factor"], {name: (rows["median_error_deg"], colour, "o-")})
+        thesis = rows["published_median_error_deg"]
+        axis.plot(rows["factor"], thesis, "--", color=colour, lw=1, label=f"{name} (thesis)")
+        draw_lines(axis, rows["factor"], {name: (rows["median_error_deg"], colour, "o-")})
     rows = table[(table["resizing"] == "averaged") & ~table["smoothed"]]
-    lines(axes[0, 0], rows["factor"], {"averaged": (rows["median_error_deg"], GOOD_COLOUR, "s-")})
-    axes[0, 0].set_xlabel("resize factor")
-    return figure
+    draw_lines(axis, rows["factor"], {"averaged": (rows["median_error_deg"], GOOD_COLOUR, "s-")})
+    axis.set_xlabel("resize factor")
+    return drawn
 
 
-@picture(
-    "7.3", "resolution", "The same, as box plots and means",
-    "Left: views sampled without (red) and with smoothing (blue). Right: mean errors beside the thesis's (dashed).",
-)  # fmt: skip
-def _factor_boxes(found: Findings, material: Material) -> Figure:
-    figure, axes = canvas(WIDE, 1, 2)
-    table = found.tables["by_factor"]
+@figure("7.3", "resolution", "The same as box plots and means")
+def _factor_boxes(results: StudyResults, data: StudyData) -> Figure:
+    """Left: views sampled without (red) and with smoothing (blue). Right: mean errors, and those of the thesis (dashed)."""
+    drawn, axes = canvas(WIDE, 1, 2)
+    table = results.tables["by_factor"]
     for smoothed, colour, name in ((False, PATH_COLOUR, "sampled"), (True, ROUTE_COLOUR, "smoothed")):
         rows = table[(table["resizing"] == "sampled") & (table["smoothed"] == smoothed)]
-        boxes(axes[0, 0], rows, "factor", colour, shift=0.2 if smoothed else -0.2, width=0.35)
+        draw_error_boxes(axes[0, 0], rows, "factor", colour, shift=0.2 if smoothed else -0.2, width=0.35)
         axes[0, 1].plot(rows["factor"], rows["published_mean_error_deg"], "--", color=colour, lw=1)
-        lines(axes[0, 1], rows["factor"], {name: (rows["mean_error_deg"], colour, "o-")}, ylabel="mean error (degrees)")
-    axes[0, 0].set(xlabel="resize factor", ylabel="error (degrees)", ylim=(0, 180), yticks=range(0, 181, 45))
+        means = {name: (rows["mean_error_deg"], colour, "o-")}
+        draw_lines(axes[0, 1], rows["factor"], means, ylabel="mean error (degrees)")
+    _label_errors(axes[0, 0], "resize factor")
     axes[0, 1].set_xlabel("resize factor")
-    return figure
+    return drawn
 
 
-@picture(
-    "18",
-    "resolution",
-    "Preprocessing",
-    "A view before and after: grey, smoothed, resized by the factor that the thesis chose (6).",
-)
-def _preprocessing(found: Findings, material: Material) -> Figure:
-    figure, axes = canvas((7.2, 3.4), 2, 1)
-    view = material.route_views[len(material.route_views) // 2]
-    panorama(axes[0, 0], view, "before")
-    panorama(axes[1, 0], ENCODING(view[None])[0].numpy(), str(ENCODING))
+@figure("18", "resolution", "Preprocessing")
+def _preprocessing(results: StudyResults, data: StudyData) -> Figure:
+    """A view before and after: grey, smoothed, resized by the factor that the thesis chose (6)."""
+    drawn, axes = canvas((7.2, 3.4), 2, 1)
+    view = data.route_views[len(data.route_views) // 2]
+    draw_panorama(axes[0, 0], view, "before")
+    draw_panorama(axes[1, 0], ENCODING(view[None])[0].numpy(), str(ENCODING))
     axes[0, 0].set_xlabel("")
-    return figure
+    return drawn
+
+
+def _label_errors(axes: Axes, xlabel: str) -> None:
+    axes.set(xlabel=xlabel, ylabel="error (degrees)", ylim=(0, 180), yticks=range(0, 181, 45))
+
+
+FIGURES = (
+    _perfect_memory,
+    _place_recognition,
+    _by_frequency,
+    _frequency_boxes,
+    _by_factor,
+    _factor_boxes,
+    _preprocessing,
+)

@@ -12,15 +12,11 @@ RESIZED_SMOOTHED = {
     "median_error_deg": (7.690, 7.361, 7.174, 8.445, 10.468, 12.102, 13.539, 18.854, 18.467, 20.637),
 }
 
-# The grids that appendices 7.4 to 7.6 searched, decoded from the numbers of their rows (docs/report.md).
+# The grids that were searched for appendices 7.4 to 7.6; they follow from the numbers of the rows there (docs/report.md).
 _ALL = {"activation": ("identity", "logistic", "tanh", "relu"), "solver": ("sgd", "adam", "lbfgs")}
 GRIDS = {
     "first_20": _ALL
-    | {
-        "hidden_layer_sizes": ((20,), (20, 20)),
-        "learning_rate_init": (1e-3, 1e-4, 1e-5),
-        "tol": (1e-3, 1e-4, 1e-5),
-    },
+    | {"hidden_layer_sizes": ((20,), (20, 20)), "learning_rate_init": (1e-3, 1e-4, 1e-5), "tol": (1e-3, 1e-4, 1e-5)},
     "whole_route": _ALL
     | {
         "hidden_layer_sizes": ((20,), (20, 20), (100,)),
@@ -40,16 +36,16 @@ GRIDS = {
 BEST_TUNINGS = {
     "first_20": (
         0.850, 1.000,
-        {"activation": "relu", "hidden_layer_sizes": (20, 20), "learning_rate_init": 1e-4, "solver": "lbfgs", "tol": 1e-5},
+        {"activation": "relu", "hidden_layer_sizes": (20, 20), "learning_rate_init": 1e-4, "solver": "lbfgs", "tol": 1e-5}
     ),
     "whole_route": (
         0.772, 0.875,
-        {"activation": "relu", "hidden_layer_sizes": (100,), "learning_rate_init": 1e-6, "solver": "adam", "tol": 1e-6},
+        {"activation": "relu", "hidden_layer_sizes": (100,), "learning_rate_init": 1e-6, "solver": "adam", "tol": 1e-6}
     ),
     "more_in_corners": (
         0.821, 1.000,
-        {"activation": "tanh", "hidden_layer_sizes": (100,), "learning_rate_init": 1e-5, "solver": "lbfgs", "tol": 1e-4},
-    ),
+        {"activation": "tanh", "hidden_layer_sizes": (100,), "learning_rate_init": 1e-5, "solver": "lbfgs", "tol": 1e-4}
+    )
 }  # fmt: skip
 
 GRID_VIEWS = 2601  # 4.1

@@ -1,0 +1,9 @@
+from .ardin2016 import ARDIN2016 as ARDIN2016
+from .azevedo2025 import AZEVEDO2025 as AZEVEDO2025
+from .baddeley2012 import BADDELEY2012 as BADDELEY2012
+from .kagioulis2024 import KAGIOULIS2024 as KAGIOULIS2024
+from .protocol import Item as Item
+from .protocol import Parameter as Parameter
+from .protocol import Protocol as Protocol
+from .protocol import routes_in as routes_in
+from .registry import PROTOCOLS as PROTOCOLS

@@ -1,0 +1,17 @@
+"""The protocols by name. A new one is a file in this folder and a line here."""
+
+from tussock.world.registry import Registry
+
+_HERE = "tussock.navigation.studies.protocols"
+
+# The first line of a file's docstring is the sentence that the command line shows for its protocol.
+PROTOCOLS = Registry(
+    "protocols",
+    "protocol",
+    {
+        "ardin2016": f"{_HERE}.ardin2016:ARDIN2016",
+        "baddeley2012": f"{_HERE}.baddeley2012:BADDELEY2012",
+        "azevedo2025": f"{_HERE}.azevedo2025:AZEVEDO2025",
+        "kagioulis2024": f"{_HERE}.kagioulis2024:KAGIOULIS2024",
+    },
+)

@@ -1,0 +1,301 @@
+"""Reports as data: results on disk, claims over several runs, and what write_report leaves in a folder."""
+
+import gc
+import json
+import math
+import subprocess
+import sys
+import weakref
+from importlib import import_module
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tussock.navigation.reports.claims import Claim, Decision, Spread, check_claims
+from tussock.navigation.reports.drawing import canvas
+from tussock.navigation.reports.maps import draw_map, map_axes
+from tussock.navigation.reports.page import format_spread, format_value
+from tussock.navigation.reports.report import (
+    Bullets,
+    Cell,
+    ClaimBox,
+    ClaimTable,
+    Command,
+    Drawing,
+    Report,
+    Section,
+    Table,
+    Text,
+    check_report_folder,
+    write_report,
+)
+from tussock.navigation.reports.results import StudyResults, plain_json, read_results, write_results
+from tussock.world.errors import FileError, SettingError
+from tussock.world.scene import World
+
+
+@pytest.mark.parametrize("name", ["tussock.navigation.reports", "tussock.navigation.studies.protocols"])
+def test_public_names_are_listed_and_can_be_loaded(name):
+    module = import_module(name)
+    assert len(dir(module)) >= 8
+    for public in dir(module):
+        assert getattr(module, public) is not None
+
+
+# Results on disk
+
+
+def example() -> StudyResults:
+    table = pd.DataFrame(
+        {
+            "x": [1, 2],
+            "y": [0.1, float("nan")],
+            "none": [float("nan")] * 2,
+            "name": ["a", "b"],
+            "yes": [True, False],
+        }
+    )
+    return StudyResults(tables={"t": table}, numbers={"n": np.float64(0.1), "nan": math.nan, "several": (1, 2)})
+
+
+def test_results_are_read_as_they_were_written(tmp_path):
+    path = tmp_path / "f.json"
+    write_results(example(), path, "key")
+    results = read_results(path, "key")
+    assert results is not None
+    pd.testing.assert_frame_equal(results.tables["t"], example().tables["t"])
+    assert math.isnan(results.numbers.pop("nan"))
+    assert results.numbers == {"n": 0.1, "several": [1, 2]}
+    assert read_results(path, "another key") is None
+    assert read_results(tmp_path / "missing.json", "key") is None
+
+
+def test_results_of_earlier_versions_with_claims_in_them_can_be_read():
+    saved = example().to_json() | {"claims": [{"key": "k", "holds": True}]}
+    assert StudyResults.from_json(saved).numbers["n"] == 0.1
+
+
+@pytest.mark.parametrize("damage", ["cut", "digit", "empty", "binary", "another shape"])
+def test_damaged_results_are_noticed(tmp_path, damage):
+    path = tmp_path / "f.json"
+    write_results(example(), path, "key")
+    whole = path.read_bytes()
+    damaged = {
+        "cut": whole[:-40],
+        "digit": whole.replace(b"0.1", b"0.2"),
+        "empty": b"",
+        "binary": b"\xff\x00" * 9,
+        "another shape": b"[1]",
+    }
+    path.write_bytes(damaged[damage])
+    with pytest.raises(ValueError):  # noqa: PT011 (the message is that of the reader, whichever it is)
+        read_results(path, "key")
+
+
+def test_plain_json_has_no_nan_and_no_numpy():
+    value = plain_json({"a": np.float32(1.5), "b": [float("nan"), np.int64(2)], "c": (float("inf"), True)})
+    assert json.loads(json.dumps(value, allow_nan=False)) == {"a": 1.5, "b": [None, 2], "c": [None, True]}
+
+
+# Claims
+
+
+def claim(**changes) -> Claim:
+    """A claim that the number x is at least 0.5; nan is not tested."""
+
+    def decide(results: StudyResults) -> Decision:
+        x = results.numbers["x"]
+        return Decision({"x (deg)": x}, None if math.isnan(x) else x >= 0.5)
+
+    texts = {"key": "large", "statement": "x is large.", "figure": "7", "test": "x is at least 0.5", "note": "A note."}
+    return Claim(**texts | {"decide": decide, "published": {"x (deg)": 1.0}} | changes)
+
+
+def outcome(*numbers: float, **changes):
+    runs = [StudyResults(tables={}, numbers={"x": x}) for x in numbers]
+    (result,) = check_claims([claim(**changes)], runs)
+    return result
+
+
+@pytest.mark.parametrize(
+    ("numbers", "label", "style"),
+    [
+        ([1.0], "holds", "yes"),
+        ([0.0], "does not hold", "no"),
+        ([math.nan], "not tested", "untested"),
+        ([math.nan, math.nan], "not tested", "untested"),
+        ([1.0, 1.0], "holds in 2 of 2", "yes"),
+        ([1.0, 0.0, math.nan], "holds in 1 of 2", "partly"),
+        ([0.0, 0.0], "holds in none of 2", "no"),
+        ([1.0, math.nan], "holds in 1 of 1", "yes"),
+    ],
+)
+def test_labels_of_outcomes(numbers, label, style):
+    assert (outcome(*numbers).label, outcome(*numbers).style) == (label, style)
+
+
+@given(st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), min_size=1, max_size=9))
+def test_spreads_are_those_of_numpy(numbers):
+    spread = outcome(*numbers).spreads["x (deg)"]
+    known = [x for x in numbers if not math.isnan(x)]
+    if known:
+        assert np.allclose(spread, (np.median(known), min(known), max(known)))
+    else:
+        assert np.isnan(spread).all()
+
+
+def test_published_numbers_may_depend_on_what_was_run():
+    result = outcome(3.0, published=lambda results: {"x (deg)": 2 * results.numbers["x"]})
+    assert result.rows == [("x (deg)", 6.0, Spread(3, 3, 3))]
+
+
+def test_rows_have_every_label_once():
+    result = outcome(1.0, published={"x (deg)": 4.0, "y": 5.0})
+    assert result.rows == [("x (deg)", 4.0, Spread(1, 1, 1)), ("y", 5.0, None)]
+
+
+# Pages
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.5, "0.5"), (12.0, "12"), (110.4, "110"), (float("nan"), "–"), (True, "yes"), (None, "–"), ([20, 20], "20, 20")],
+)
+def test_values_as_text(value, text):
+    assert format_value(value) == text
+
+
+@pytest.mark.parametrize(
+    ("spread", "text"),
+    [(Spread(1, 1, 1), "1"), (Spread(2, 1, 3), "2 (1 to 3)"), (Spread(*[math.nan] * 3), "–"), (None, "–")],
+)
+def test_spreads_as_text(spread, text):
+    assert format_spread(spread) == text
+
+
+def report(draw, **changes) -> Report:
+    """A report with a block of every kind."""
+    result = outcome(1.0)
+    shown = [
+        Drawing(names=("curve", "view"), draw=draw, alt="a curve", caption="A caption."),
+        ClaimBox(result),
+        Command("tussock study <x>"),
+    ]
+    table = Table(columns=["a", "b"], rows=[["1 < 2", Cell(text="3", note="(2 to 4)", bold=True)]], caption="A table.")
+    blocks = [
+        Section(
+            title="Summary",
+            anchor="summary",
+            blocks=[ClaimTable(outcomes=[result], links={"large": ("fig", "Figure 7")})],
+        ),
+        Section(title="Part", anchor="part", blocks=[Section(title="Fig", anchor="fig", blocks=shown)]),
+        table,
+        Text("Some text", anchor="text"),
+        Bullets(["first", "second"]),
+    ]
+    fields = {
+        "title": "T & Co",
+        "lead": "Lead.",
+        "about": {"World": "w"},
+        "footer": "The end.",
+        "results": {"n": math.nan},
+    }
+    return Report(**fields | {"blocks": blocks} | changes)
+
+
+def draw_two():
+    for _ in range(2):
+        figure, axes = canvas((2, 1))
+        axes[0, 0].plot([0, 1])
+        yield figure
+
+
+def test_a_report_has_figures_json_and_one_page(tmp_path):
+    done = []
+    results = write_report(report(draw_two), tmp_path, lambda *numbers: done.append(numbers))
+    assert results == json.loads((tmp_path / "results.json").read_text()) == {"n": None}
+    names = ["curve.png", "curve.svg", "view.png", "view.svg"]
+    assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == names
+    assert done == [(0, 1)]
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 2
+    for text in (
+        "<h1>T &amp; Co</h1>",
+        "<h2>Part</h2>",
+        "<h3>Fig</h3>",
+        "1 &lt; 2",
+        "tussock study &lt;x&gt;",
+        "x (°)",
+    ):
+        assert text in page
+    for text in ("A caption.", "A table.", "x is large.", "Test: x is at least 0.5. A note.", "Figure 7", "The end."):
+        assert text in page
+    for anchor in ("summary", "part", "fig", "text", "claim-large"):
+        assert page.count(f'id="{anchor}"') == 1
+
+
+def test_the_same_report_has_the_same_bytes(tmp_path):
+    for folder in ("a", "b"):
+        write_report(report(draw_two), tmp_path / folder)
+    for path in (tmp_path / "a").rglob("*.*"):
+        assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes(), path
+
+
+def test_drawing_leaves_the_style_of_matplotlib_as_it_was(tmp_path):
+    before = dict(matplotlib.rcParams)
+    write_report(report(draw_two), tmp_path)
+    assert dict(matplotlib.rcParams) == before
+    imports = "import tussock.navigation.reports.report, tussock.navigation.reports.maps"
+    script = f"import matplotlib as m; before = dict(m.rcParams); {imports}; assert dict(m.rcParams) == before"
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_maps_keep_no_world_in_memory():
+    world = World.generate("tiny", 1)
+    alive = weakref.ref(world)
+    xy = np.array([(0.0, 0.0), (1.0, 1.0)])
+    figure, axes = map_axes(xy)
+    draw_map(axes[0, 0], world, xy)
+    assert axes[0, 0].images
+    del figure, axes, world
+    gc.collect()
+    assert alive() is None
+
+
+def test_a_page_has_the_reason_in_place_of_figures_that_cannot_be_drawn(tmp_path):
+    def draw():
+        raise SettingError("there is no world 'gone.glb'")
+
+    write_report(report(draw), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "There is no figure: there is no world &#39;gone.glb&#39;." in page
+    assert "data:image" not in page
+
+
+def test_a_report_that_fails_leaves_no_page(tmp_path):
+    def draw():
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        write_report(report(draw), tmp_path)
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_a_folder_with_another_report_is_refused(tmp_path):
+    about = {"World": "w", "Seed": 1}
+    check_report_folder(tmp_path / "new", about)
+    write_report(report(draw_two, results={"about": about}), tmp_path)
+    check_report_folder(tmp_path, about)
+    with pytest.raises(FileError, match=r"something else \(Seed\)"):
+        check_report_folder(tmp_path, about | {"Seed": 2})
+    check_report_folder(tmp_path, about | {"Seed": 2}, overwrite=True)
+    (tmp_path / "results.json").write_text("damaged")
+    with pytest.raises(FileError, match=r"something else \(World, Seed\)"):
+        check_report_folder(tmp_path, about)
+    with pytest.raises(FileError, match="is a file"):
+        check_report_folder(Path(__file__), about)
