@@ -71,7 +71,7 @@ class RouteTask:
     world_seed: int = whole(0, low=0)
     worlds: int = whole(1)
     route: Any = instance_of(Route | str | os.PathLike | None, None, "a Route or its file")
-    length: float = number(8.0, above=0, unit="m")
+    length: float = number(8.0, low=0.1, unit="m")
     eye: Eye = instance_of(Eye, Eye(width=90, height=25), "an Eye")  # a pixel is 4 degrees wide and 3 high
     encoding: Any = instance_of(Encoding | str | None, None, "its name or its steps")
     renderer: str = "auto"
@@ -267,11 +267,11 @@ class Episode:
 
 
 def as_numbers(name: str, given: Any, count: int, wanted: str) -> list[float]:
-    """What is given, as `count` numbers. Raises SettingError."""
+    """What is given, as `count` finite numbers. Raises SettingError."""
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise SettingError(f"{name}: {error}; give {wanted}") from error
-    if values.shape != (count,):
+    if values.shape != (count,) or not np.isfinite(values).all():
         raise SettingError(f"{name} {values.tolist()}; give {wanted}")
     return values.tolist()
