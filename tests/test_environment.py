@@ -20,9 +20,10 @@ from scenes import random_world
 from tussock.navigation.agent import Agent
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.encoding_steps import Grey, VerticalEdges
+from tussock.navigation.experiment import Experiment
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.rl.environment import ID, RouteFollowing, RouteFollowingVector
-from tussock.navigation.rl.task import ARRIVAL_REWARD
+from tussock.navigation.rl.task import ARRIVAL_REWARD, RouteTask
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.navigation.stopping import StopReason
 from tussock.navigation.training import train, training_poses
@@ -327,6 +328,11 @@ def test_frames_are_enlarged_views(make_env):
     observations, _ = many.reset(seed=0)
     assert np.array_equal(np.stack(many.render())[:, ::30, ::30], observations)
     assert make_env().render() is None
+
+
+def test_an_episode_is_by_default_what_an_experiment_is_by_default():
+    task = RouteTask()
+    assert task.experiment == Experiment(eye=task.eye)
 
 
 @pytest.mark.parametrize(
