@@ -282,6 +282,13 @@ def test_episodes_end_for_the_right_reason(make_env, action, settings, reason, s
         env.step(np.array(action))
 
 
+def test_a_step_back_costs_what_the_step_ahead_earned(make_env):
+    env = make_env(route=STRAIGHT, offset=0.0)
+    env.reset(options={"start": (1.0, 1.5, 0.0)})
+    assert np.isclose(env.step(np.array(AHEAD))[1], 0.05)
+    assert np.isclose(env.step(np.array([1.0, 1.0]))[1], -0.05)
+
+
 def test_an_agent_that_turns_on_the_spot_is_not_stuck(make_env):
     env = make_env(route=STRAIGHT, patience=0.2)
     env.reset(seed=0)
