@@ -11,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -20,6 +21,7 @@ import pytest
 from tussock.navigation.agent import Agent
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import PerfectMemory
+from tussock.navigation.recording import log
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.recording.run_folder import play
 from tussock.navigation.recording.viewer import viewer_program
@@ -92,9 +94,11 @@ def record(path: Path, agent: Agent, **settings) -> int:
 
 @pytest.fixture(scope="module")
 def recorded(agent, tmp_path_factory):
-    """A recording of a walk, and its number of looks."""
+    """A recording of a walk, written step by step, and its number of looks."""
     path = tmp_path_factory.mktemp("run") / "recording.rrd"
-    return path, record(path, agent, training_poses=agent.trained.poses, title="a walk")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(log, "FLUSH_SECONDS", 0.0)
+        return path, record(path, agent, training_poses=agent.trained.poses, title="a walk")
 
 
 @pytest.fixture
@@ -133,7 +137,7 @@ def test_a_recording_verifies_and_holds_every_step(recorded):
 
 def test_steps_without_a_view_and_a_scan_are_recorded(agent, tmp_path):
     with Recording(tmp_path / "r.rrd", agent.renderer, agent.route, training_poses=agent.trained.poses) as recording:
-        for step, _ in zip(agent.walk(agent.start()), range(3), strict=False):
+        for step in islice(agent.walk(agent.start()), 3):
             recording.log(dataclasses.replace(step, view=None, familiarity=None, scanned=None, match=None))
     rerun("rrd", "verify", tmp_path / "r.rrd")
     rows = rows_of(tmp_path / "r.rrd")
