@@ -45,7 +45,7 @@ MODEL_SUFFIX = ".safetensors"  # of files of trained models
 FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
 
 
-def _encoding(value: Any, experiment: "Experiment") -> Any:
+def _encoding(value: Any, experiment: Any = None) -> Any:
     """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
     from .encoding import PRESETS, Encoding
 

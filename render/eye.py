@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.errors import InputError
-from tussock.world.geometry import FARTHEST
+from tussock.world.geometry import MAX_COORDINATE
 
 MOST_RAYS = 10**8  # 1.2 GB a thread to draw with
 
@@ -36,7 +36,7 @@ class Eye:
                 raise InputError(f"the eye's {name} is {value!r}; give a whole number")
         for name in ("top", "bottom", "z"):
             value = getattr(self, name)
-            if not (isinstance(value, int | float | np.number) and abs(value) <= FARTHEST):
+            if not (isinstance(value, int | float | np.number) and abs(value) <= MAX_COORDINATE):
                 raise InputError(f"the eye's {name} is {value!r}; give a finite number")
         if self.width < 4 or self.height < 1:
             raise InputError(f"a view of {self.width} x {self.height} pixels cannot be drawn; give at least 4 x 1")

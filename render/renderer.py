@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import InputError
-from tussock.world.geometry import FARTHEST, Pose
+from tussock.world.geometry import MAX_COORDINATE, Pose
 from tussock.world.scene import World
 
 from .eye import Eye
@@ -34,7 +34,7 @@ class Renderer(Protocol):
         """Panoramas at poses (x [m], y [m], heading [rad]); one pose is a batch of one.
 
         Colour is the average over each pixel's solid angle, the sky included; alpha is the share of the pixel
-        that something covers (255: all of it, 0: open sky). Raises InputError for poses that are not finite, or beyond FARTHEST.
+        that something covers (255: all of it, 0: open sky). Raises InputError for poses that are not finite, or beyond MAX_COORDINATE.
         """
         ...
 
@@ -86,8 +86,8 @@ def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
         array = array.reshape(0, 3)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"poses are rows of x, y, heading; got an array of shape {array.shape}")
-    near = np.abs(array) <= FARTHEST  # False for nan, too
+    near = np.abs(array) <= MAX_COORDINATE  # False for nan, too
     if not near.all():
         row = int(near.all(axis=1).argmin())
-        raise InputError(f"pose {row} is {array[row].tolist()}; a pose needs finite numbers up to {FARTHEST:g}")
+        raise InputError(f"pose {row} is {array[row].tolist()}; a pose needs finite numbers up to {MAX_COORDINATE:g}")
     return array

@@ -77,12 +77,7 @@ def routes(points, spacing):
 
 
 @holds(120)
-@given(
-    st.dictionaries(
-        st.sampled_from([field.name for field in dataclasses.fields(WorldParams)]) | st.text(max_size=3), VALUES
-    )
-    | VALUES
-)
+@given(st.dictionaries(st.sampled_from(list(WorldParams().to_dict())) | st.text(max_size=3), VALUES) | VALUES)
 def parameters(values):
     params = answer(None, lambda: WorldParams.from_dict(values))
     assert params is None or WorldParams.from_dict(params.to_dict()) == params

@@ -144,7 +144,8 @@ def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
     settings = settings_of(experiment)
     values: dict[str, Any] = {name: settings[name] for name in ASKED}
     values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in ASKED}
-    return Line(**values | {"arrived": bool(results.get("arrived"))})
+    values["arrived"] = bool(values["arrived"])
+    return Line(**values)
 
 
 def result_of(
@@ -220,7 +221,8 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
         rest: dict[str, Any] = {
             name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")
         }
-        result = Result(**rest | {"encoding": current_encoding(rest["encoding"])}, runs=lines, times=times)
+        rest["encoding"] = current_encoding(rest["encoding"])
+        result = Result(**rest, runs=lines, times=times)
         scores = json.loads(json.dumps(result.scores()))
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError) as error:
         raise FileError(f"{path} is not a result of tussock benchmark ({error!r}); make it again") from error

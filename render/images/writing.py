@@ -15,7 +15,7 @@ from jaxtyping import Float, UInt8
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import InputError
-from tussock.world.geometry import FARTHEST, Bounds
+from tussock.world.geometry import MAX_COORDINATE, Bounds
 
 from ..renderer import Poses, Renderer
 from .database import HEADING, Database, X, Y, Z, read_database
@@ -57,7 +57,7 @@ class Grid:
     @classmethod
     def over(cls, bounds: Bounds, spacing: float) -> "Grid":
         """The multiples of `spacing` (m) inside bounds, borders included. Raises InputError where there are none, or over a million."""
-        if not (FINEST <= spacing <= FARTHEST and (np.abs(bounds) <= FARTHEST).all()):
+        if not (FINEST <= spacing <= MAX_COORDINATE and (np.abs(bounds) <= MAX_COORDINATE).all()):
             raise InputError(
                 f"a grid of {spacing:g} m over {bounds}; give a spacing from {FINEST:g} up, and finite metres"
             )
