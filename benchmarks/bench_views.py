@@ -40,9 +40,13 @@ def test_growth_with_triangles(measure, size, n):
     with open_renderer(world, Eye(width=width, height=height, samples=1), "cpu") as renderer:
         poses = worlds.poses_in(world, 8)
         measure(
-            f"view {width} x {height}, a meadow of {n:,} triangles", lambda: renderer.render(poses), items=8, unit="ms a view",
-            rounds=7, curve=("triangles", f"{width} x {height}", n),
-        )  # fmt: skip
+            f"view {width} x {height}, a meadow of {n:,} triangles",
+            lambda: renderer.render(poses),
+            items=8,
+            unit="ms a view",
+            rounds=7,
+            curve=("triangles", f"{width} x {height}", n),
+        )
 
 
 def test_view_by_opengl(measure):
@@ -62,5 +66,8 @@ def test_the_published_grid_as_a_database(measure, tmp_path):
     with open_renderer(world, Eye(), "cpu") as renderer:
         measure(
             f"{len(grid.poses()):,} views of 720 x 150, {name}, drawn and written as a PNG database",
-            lambda: write_database(tmp_path, renderer, grid), unit="s", rounds=1, warm=0,
-        )  # fmt: skip
+            lambda: write_database(tmp_path, renderer, grid),
+            unit="s",
+            rounds=1,
+            warm=0,
+        )

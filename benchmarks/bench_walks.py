@@ -7,30 +7,37 @@ import numpy as np
 import pytest
 import worlds
 
-from tussock.navigation import Agent, Encoding, PerfectMemory, Recording, learn, make_model, training_poses
+from tussock import (
+    Agent,
+    Encoding,
+    Eye,
+    PerfectMemory,
+    Recording,
+    StoppingRules,
+    generate_route,
+    make_model,
+    open_renderer,
+    train,
+    training_poses,
+)
 from tussock.navigation.training import training_views
-from tussock.render import Eye, open_renderer
-from tussock.world.routes import generate_route
 
 SNAPSHOTS, STEPS, AGENTS = 200, 200, 32
 
 
 @pytest.fixture(scope="module")
-def walker():
-    """An agent at 120 x 25 that knows a route by SNAPSHOTS views, and where these were taken."""
+def agent():
+    """An agent with an eye of 120 x 25 that has learned SNAPSHOTS views of a route."""
     _, world = worlds.everyday()
     route = generate_route(world, 1)
-    encoding, memory = Encoding.named("edges"), PerfectMemory()
+    stopping = StoppingRules(max_steps=STEPS, arrival_radius=0.01, max_deviation=9.0, patience=99.0)
     with open_renderer(world, Eye(width=120, height=25), "cpu") as renderer:
-        poses = learn(memory, encoding, renderer, training_poses(route.resampled(route.length / (SNAPSHOTS - 1))))
-        agent = Agent(
-            renderer=renderer, encoding=encoding, model=memory, route=route, max_steps=STEPS, arrive=0.01, lost=9.0, patience=99.0
-        )  # fmt: skip
-        yield agent, poses
+        poses = training_poses(route, route.length / (SNAPSHOTS - 1))
+        trained = train(PerfectMemory(), Encoding.named("edges"), renderer, poses)
+        yield Agent(renderer=renderer, trained=trained, route=route, stopping=stopping)
 
 
-def test_walk(measure, walker):
-    agent, _ = walker
+def test_walk(measure, agent):
     steps = sum(1 for _ in agent.walk(agent.start()))
     measure(
         f"a step at 120 x 25, {SNAPSHOTS} snapshots",
@@ -41,13 +48,11 @@ def test_walk(measure, walker):
     )
 
 
-def test_recorded_walk(measure, walker, tmp_path):
-    agent, poses = walker
+def test_recorded_walk(measure, agent, tmp_path):
+    path, poses = tmp_path / "a.rrd", agent.trained.poses
 
     def recorded() -> int:
-        with Recording(
-            tmp_path / "a.rrd", agent.renderer.world, agent.route, renderer=agent.renderer, training_poses=poses
-        ) as recording:
+        with Recording(path, agent.renderer, agent.route, training_poses=poses) as recording:
             for count, step in enumerate(agent.walk(agent.start()), start=1):  # noqa: B007
                 recording.log(step)
         return count
@@ -55,8 +60,7 @@ def test_recorded_walk(measure, walker, tmp_path):
     measure("the same, recorded", recorded, items=recorded(), unit="steps a second", rounds=7)
 
 
-def test_walks_side_by_side(measure, walker):
-    agent, _ = walker
+def test_walks_side_by_side(measure, agent):
     starts = [agent.start(offset) for offset in np.linspace(-0.2, 0.2, AGENTS)]
 
     def walks() -> int:
@@ -65,9 +69,8 @@ def test_walks_side_by_side(measure, walker):
     measure(f"the same, {AGENTS} agents side by side", walks, items=walks(), unit="steps a second", rounds=3)
 
 
-def test_training(measure, walker):
-    agent, poses = walker
-    views, _ = training_views(agent.encoding, agent.renderer, poses)
+def test_training(measure, agent):
+    views, _ = training_views(agent.trained.encoding, agent.renderer, agent.trained.poses)
     measure(
         f"mlp-rotation learns {SNAPSHOTS} views of 120 x 25",
         lambda: make_model("mlp-rotation").fit(views),

@@ -1,4 +1,4 @@
-"""What a first version of each computation looks like in numpy: what the project's own must equal, and beat."""
+"""A first version of each computation in numpy. The project's own must give the same results, and be faster."""
 
 import numpy as np
 from jaxtyping import Float, UInt8

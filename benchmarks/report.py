@@ -1,4 +1,4 @@
-"""From what pytest-benchmark measured (its JSON) to a table, the growth curves, and docs/performance.md's numbers."""
+"""Turns the JSON of pytest-benchmark into a table, the growth curves, and the numbers of docs/performance.md."""
 
 import json
 import sys
@@ -14,7 +14,7 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 
 def figures(measured: dict) -> list[dict]:
-    """What was measured: beside what each benchmark notes (see conftest.py), seconds an item, in the median and in the best round."""
+    """The results: what each benchmark writes (see conftest.py), and seconds per item, in the median and in the best round."""
     rows = []
     for each in measured["benchmarks"]:
         info = each["extra_info"]
@@ -25,21 +25,21 @@ def figures(measured: dict) -> list[dict]:
 
 
 def in_unit(seconds: float, unit: str) -> str:
-    """A time an item as it is told: steps a second, s, or ms."""
+    """A time per item as a text: in steps a second, s, or ms."""
     if unit == "steps a second":
         return f"{1 / seconds:,.0f} {unit}"
     return f"{seconds:.3g} s" if unit == "s" else f"{1000 * seconds:.3g} {unit}"
 
 
 def cells(row: dict) -> tuple[str, str, str, str]:
-    """A row of the table: what, median, best round, naive and ratio."""
+    """A row of the table, in the order of HEAD."""
     naive = row["naive_seconds"]
     against = "" if naive is None else f"{1000 * naive:,.0f} ms, {naive / row['seconds']:,.0f} times"
     return row["name"], in_unit(row["seconds"], row["unit"]), in_unit(row["best"], row["unit"]), against
 
 
 def draw(rows: list[dict], axis: str, path: Path) -> None:
-    """The growth curves over `axis`, on logarithmic scales, beside what linear growth would be."""
+    """The growth curves over `axis`, on logarithmic scales, next to linear growth."""
     figure, plot = plt.subplots(figsize=(5.2, 3.6), layout="constrained")
     curves: dict[str, list[tuple[float, float]]] = {}
     for row in rows:
@@ -58,7 +58,7 @@ def draw(rows: list[dict], axis: str, path: Path) -> None:
 
 
 def main(paths: list[Path]) -> None:
-    """Print the table and bring docs/performance.md up to date."""
+    """Print the table, and write it into docs/performance.md."""
     parts = [json.loads(path.read_text()) for path in paths]
     rows = [row for part in parts for row in figures(part)]
     measured = parts[0]

@@ -1,4 +1,4 @@
-"""Worlds to measure in."""
+"""Worlds for the benchmarks."""
 
 from pathlib import Path
 
@@ -12,12 +12,12 @@ SUSSEX = Path(__file__).parents[2] / "shared" / "sussex" / "world5000_gray.bin"
 
 
 def everyday() -> tuple[str, World]:
-    """The Sussex world where it is at hand, else one of this project's."""
+    """The Sussex world where it is on this machine, else a generated one; with its name."""
     return ("Sussex", read_world(SUSSEX)) if SUSSEX.is_file() else ("tussock-field", World.generate("tussock-field", 1))
 
 
 def blades(n: int) -> World:
-    """A meadow of n blades, 50 to the square metre: the more of them, the more lie far away."""
+    """A meadow of n blades, 50 per square metre: the more there are, the more of them are far away."""
     rng = np.random.default_rng(0)
     side = np.sqrt(n / 50)
     foot = rng.uniform(0, side, (n, 2))
@@ -25,10 +25,8 @@ def blades(n: int) -> World:
     triangles = np.zeros((n, 3, 3), dtype=np.float32)
     triangles[:, 0, :2], triangles[:, 1, :2] = foot - across, foot + across
     triangles[:, 2, :2], triangles[:, 2, 2] = foot + rng.normal(0, 0.05, (n, 2)), rng.uniform(0.05, 0.5, n)
-    return World(
-        triangles=triangles, rgb=rng.integers(0, 256, (n, 3), dtype=np.uint8), field=Bounds(0, 0, side, side), ground=None,
-        sky_rgb=(200, 220, 255),
-    )  # fmt: skip
+    rgb = rng.integers(0, 256, (n, 3), dtype=np.uint8)
+    return World(triangles=triangles, rgb=rgb, field=Bounds(0, 0, side, side), ground=None, sky_rgb=(200, 220, 255))
 
 
 def poses_in(world: World, n: int, seed: int = 0) -> Float[np.ndarray, "n 3"]:

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/models.md: how familiar each model finds every heading, on a straight and at a corner.
+"""Draws the pictures of docs/models.md: the familiarity of every heading for each model, on a straight and at a corner.
 
     python docs/draw_models.py [NAME ...]
 
@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tussock.navigation import Encoding, learn, make_model, training_poses
+from tussock.navigation import Encoding, make_model, train, training_poses
 from tussock.navigation.models import MODELS
 from tussock.navigation.reports.drawing import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, STYLE, save_picture
 from tussock.navigation.scan import best_turn
@@ -24,8 +24,8 @@ from tussock.world.routes import generate_route
 
 PICTURES = Path(__file__).parents[1] / "assets" / "models"
 STRETCH = 0.5  # m over which the route's change of heading is taken
-FROM_ENDS = 1.0  # m of the route at both ends where no place is looked for
-BESIDE = 0.05  # m to the left of the route: no trained view is there
+FROM_ENDS = 1.0  # m at both ends of the route that are left out
+ASIDE = 0.05  # m to the left of the route: no view was learned there
 FACING = np.radians(40)  # to the left of the route's heading, so that the answer is not rotation 0
 
 
@@ -80,13 +80,12 @@ def main(names: list[str]) -> None:
     world = World.generate("tussock-field", seed=7)
     route = generate_route(world, seed=7)
     encoding = Encoding.named("edges", resize=6)
-    eyes = [Pose(*route.at(along)[0]).moved(0, BESIDE).turned(FACING) for along in straight_and_corner(route)]
+    eyes = [Pose(*route.at(along)[0]).moved(0, ASIDE).turned(FACING) for along in straight_and_corner(route)]
     PICTURES.mkdir(exist_ok=True)
     with open_renderer(world) as renderer:
         seen = encoding(renderer.render(eyes))
         for name in names:
-            model = make_model(name)
-            learn(model, encoding, renderer, training_poses(route.resampled(0.04)))
+            model = train(make_model(name), encoding, renderer, training_poses(route, 0.04)).model
             straight, corner = model.scan(seen).numpy()
             positions = [("on a straight", straight, FACING), ("at a corner", corner, FACING)]
             draw(PICTURES / f"{name}.png", positions, title=name)

@@ -245,7 +245,9 @@ class Normalise(EncodingStep):
     def __call__(self, images: Images) -> Images:
         centred = images - images.mean(axis=(1, 2), keepdims=True)
         deviation = centred.std(axis=(1, 2), keepdims=True)
-        return centred / np.where(deviation > 1e-6, deviation, np.inf)
+        # Where there is hardly any contrast, the rounding of the mean would lead out of the bounds.
+        low, high = self.bounds(0.0, 1.0, images.shape[1] * images.shape[2])
+        return (centred / np.where(deviation > 1e-6, deviation, np.inf)).clip(low, high)
 
     def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
         most = float(np.sqrt(pixels - 1))  # of one pixel that differs from all others

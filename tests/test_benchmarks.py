@@ -1,4 +1,4 @@
-"""What the benchmarks compare gives the same result: the naive versions are oracles of their own."""
+"""Fast and naive versions of the benchmarks give the same results: the naive ones are independent oracles."""
 
 import naive
 import numpy as np

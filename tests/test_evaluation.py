@@ -1,4 +1,4 @@
-"""Heading errors: what they are made of, and what the study found in the Sussex world."""
+"""Heading errors: what they are made of, and the published study's results in the Sussex world."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,10 @@ import pytest
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.evaluation import grid_positions, heading_errors, nearest_view
 from tussock.navigation.models import PerfectMemory, make_model
-from tussock.navigation.training import learn, training_poses
+from tussock.navigation.training import train, training_poses
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 from tussock.world.files import read_world
 from tussock.world.geometry import Bounds, Route, wrap_angle
 from tussock.world.route_files import read_route
@@ -31,14 +31,14 @@ def test_grid_positions_are_the_multiples_near_the_route():
 
 @pytest.mark.parametrize("settings", [{"grid": 0}, {"grid": np.nan}, {"grid": 1e-6}, {"grid": 5.0, "within": 0.01}])
 def test_grids_without_positions_are_refused(settings):
-    with pytest.raises(InputError):
+    with pytest.raises(SettingError, match=f"{settings['grid']:g} m"):
         grid_positions(ROUTE, **({"grid": 0.2, "within": 0.2, "field": FIELD} | settings))
 
 
-def test_place_recognition_finds_the_nearest_view():
-    places = np.random.default_rng(0).uniform(0, 4, (30, 2))
-    for place, found in zip(places, nearest_view(ROUTE, places), strict=True):
-        assert found == min(range(len(ROUTE.xy)), key=lambda i: np.hypot(*(ROUTE.xy[i] - place)))
+def test_place_recognition_takes_the_nearest_view():
+    positions = np.random.default_rng(0).uniform(0, 4, (30, 2))
+    for position, nearest in zip(positions, nearest_view(ROUTE, positions), strict=True):
+        assert nearest == min(range(len(ROUTE.xy)), key=lambda i: np.hypot(*(ROUTE.xy[i] - position)))
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +50,12 @@ def tiny():
 def test_on_the_route_itself_perfect_memory_makes_no_error(tiny):
     renderer, route = tiny
     encoding = Encoding.parse("grey")
-    model = PerfectMemory()
-    learn(model, encoding, renderer, route.poses)
-    found = heading_errors(model, encoding, renderer, route, route.xy)
+    model = train(PerfectMemory(), encoding, renderer, route.poses).model
+    result = heading_errors(model, encoding, renderer, route, route.xy)
     # Views face east, so their columns of 2 degrees lie between those of the learned views: a column either way.
-    assert np.degrees(found.errors).max() <= 4
-    assert found.median_error_deg < 1
-    assert np.array_equal(found.nearest, np.arange(len(route.xy)))
+    assert np.degrees(result.errors).max() <= 4
+    assert result.median_error_deg < 1
+    assert np.array_equal(result.nearest, np.arange(len(route.xy)))
 
 
 def test_errors_are_between_the_recovered_and_the_nearest_views_heading(tiny):
@@ -64,25 +63,24 @@ def test_errors_are_between_the_recovered_and_the_nearest_views_heading(tiny):
     encoding = Encoding.parse("grey | resize 3")
     model = make_model("visual-compass").fit(encoding(renderer.render(route.poses)))
     positions = grid_positions(route, grid=0.2, within=0.2, field=renderer.world.field)
-    found = heading_errors(model, encoding, renderer, route, positions)
-    assert np.allclose(found.errors, np.abs(wrap_angle(found.headings - route.poses[found.nearest, 2])))
-    degrees = np.degrees(found.errors)
-    assert (found.median_error_deg, found.mean_error_deg) == (np.median(degrees), np.mean(degrees))
-    assert found.share_over_45 == (degrees > 45).mean()
+    result = heading_errors(model, encoding, renderer, route, positions)
+    assert np.allclose(result.errors, np.abs(wrap_angle(result.headings - route.poses[result.nearest, 2])))
+    degrees = np.degrees(result.errors)
+    assert (result.median_error_deg, result.mean_error_deg) == (np.median(degrees), np.mean(degrees))
+    assert result.share_over_45 == (degrees > 45).mean()
     narrow = heading_errors(model, encoding, renderer, route, positions, scan=np.radians(90))
     assert np.degrees(narrow.errors).max() <= 45 + 6
 
 
 @pytest.mark.parametrize("name", ["ant1_route1", "ant4_route1"])
-def test_the_sussex_routes_give_what_the_study_found(sussex, name):
+def test_the_sussex_routes_give_the_results_of_the_study(sussex, name):
     world = read_world(sussex / "world5000_gray.bin")
     route = read_route(sussex / f"{name}.bin").resampled(0.04)
     positions = grid_positions(route, grid=0.2, within=0.2, field=world.field)
     with open_renderer(world, backend="cpu") as renderer:
 
         def errors(encoding: Encoding, every: int):
-            model = PerfectMemory()
-            learn(model, encoding, renderer, training_poses(route, every=every))
+            model = train(PerfectMemory(), encoding, renderer, training_poses(route, 0.04, every=every)).model
             return heading_errors(model, encoding, renderer, route, positions)
 
         grey = errors(Encoding.named("grey", resize=6), 6)

@@ -1,11 +1,11 @@
-"""Why walks fail: rooms built so that exactly one cause applies, and what holds of every label."""
+"""Why walks fail: rooms built so that exactly one cause applies, and laws that hold for every diagnosis."""
 
 import dataclasses
 import re
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
-import attrs
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,36 +13,21 @@ from hypothesis import strategies as st
 from scenes import random_poses, random_world, world_of
 
 from tussock.navigation import failures
+from tussock.navigation.agent import Agent
+from tussock.navigation.body import Body
 from tussock.navigation.encoding import Encoding
-from tussock.navigation.failures import (
-    ALIASING,
-    CATCHMENT,
-    CAUSES,
-    CORNER,
-    COVERED,
-    FAR,
-    OCCLUDER,
-    OCCLUSION,
-    OFF_CATCHMENT,
-    POOR,
-    REVERSE,
-    TURNING,
-    UNEXPLAINED,
-    UNLEARNED,
-    Evidence,
-    Witness,
-    cause,
-    in_words,
-    walk_cause,
-)
+from tussock.navigation.failures import CATCHMENT, FAR, POOR, Cause, Diagnosis, Diagnostics, walk_cause
 from tussock.navigation.models import make_model
+from tussock.navigation.models.files import TrainedModel
 from tussock.navigation.recording.log import Recording
-from tussock.navigation.training import learn
+from tussock.navigation.stopping import StoppingRules, StopReason
+from tussock.navigation.training import train
 from tussock.navigation.trajectory import COLUMNS, Trajectory
-from tussock.navigation.walk import ARRIVED, LOST, Agent
+from tussock.navigation.walk import Step
 from tussock.render.eye import Eye
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import open_renderer
+from tussock.world.errors import InputError
 from tussock.world.geometry import Pose, Route
 
 EYE = Eye(width=72, height=15, samples=2)
@@ -58,16 +43,16 @@ def quad(a, b, low: float, high: float) -> list:
 
 
 def ring(radius: float, heights, x: float, y: float, low: float = -0.02) -> list:
-    """Upright panels around a place, of as many heights; the ring they make is closed."""
+    """Upright panels around (x, y), one for each height, which make a closed ring."""
     angle = np.linspace(0, 2 * np.pi, len(heights) + 1)
     at = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
     return [each for k, high in enumerate(heights) for each in quad(at[k], at[k + 1], low, high)]
 
 
 def rooms(tube: tuple[float, float] | None = None):
-    """Two rooms that look the same from within, and the same after a quarter of a turn; so high that nothing else is seen from them.
+    """Two equal rooms, which also look the same after a quarter of a turn. Their walls hide everything else.
 
-    tube: where a tube stands whose inside is 3 cm away and fills the lower 45 of 75 degrees of a view.
+    tube: position of a tube. Its inside is 3 cm away and fills the lower 45 of 75 degrees of a view.
     """
     rng = np.random.default_rng(0)
     heights, tones = np.tile(rng.uniform(0.45, 0.9, 9), 4), np.tile(rng.integers(0, 200, 9), 4).repeat(2)
@@ -85,27 +70,32 @@ def straight(y: float) -> Route:
     return Route.through(np.column_stack([np.linspace(-2.9, 2.9, 291), np.full(291, y)]))
 
 
-def bent(at: tuple[float, float]) -> Route:
-    """A route that goes east until 4 cm past a place, then north."""
-    (x, y), leg = at, np.linspace(0.02, 1, 50)
+def bent(corner: tuple[float, float]) -> Route:
+    """A route that goes east until 4 cm past a position, then north."""
+    (x, y), leg = corner, np.linspace(0.02, 1, 50)
     before = np.column_stack([x + 0.04 - leg[::-1], np.full(50, y)])
     return Route.through(np.vstack([before, [(x + 0.04, y)], np.column_stack([np.full(50, x + 0.04), y + leg])]))
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """Where an agent stands in the first room, what was learned, and along which route.
+    """Where an agent stands in the first room, what it has learned, and along which route.
 
-    The view it has, turned by -turn, is the one that was learned `turn` around the middle of the room: it heads there.
+    Its view equals the learned one, which was taken `turn` further around the middle of the room, when it turns by `turn`.
+
+    Attributes:
+        off: Position of the agent, from the middle of the first room (m).
+        turn: Turn at which its view equals the learned one (rad).
+        corner: The route turns here.
+        tube: A tube stands around the agent.
+        other_room: The view that is equal was learned in the other room, and a different one next to the agent.
     """
 
-    off: tuple[float, float]  # m, from the middle of the first room
-    turn: float = np.pi / 2  # rad
+    off: tuple[float, float]
+    turn: float = np.pi / 2
     corner: bool = False
     tube: bool = False
-    other_room: bool = (
-        False  # the view that is the same was learned in the other room, and another one beside the agent
-    )
+    other_room: bool = False
 
     @property
     def start(self) -> Pose:
@@ -124,33 +114,29 @@ class Case:
         x, y = self.off
         return np.array([(MIDDLES[0] + c * x - s * y, s * x + c * y, 0.0)])
 
-    def mirrored(self) -> "Case":
-        return dataclasses.replace(self, off=(self.off[0], -self.off[1]), turn=-self.turn)
 
-
-NEAR, AWAY = (
-    (0.1, 0.1),
-    (0.18, 0.18),
-)  # a quarter of a turn around the middle is 0.2 m from the one, 0.36 m from the other
+# A quarter of a turn around the middle is 0.2 m from NEAR, and 0.36 m from AWAY.
+NEAR, AWAY = (0.1, 0.1), (0.18, 0.18)
 CASES = {
-    "unexplained": (Case(NEAR), UNEXPLAINED),
-    "unexplained, elsewhere": (Case((-0.05, 0.13), -np.pi / 2), UNEXPLAINED),
-    "occlusion": (Case(NEAR, tube=True), OCCLUSION),
-    "occlusion, elsewhere": (Case((-0.05, 0.13), -np.pi / 2, tube=True), OCCLUSION),
-    "off": (Case(AWAY), OFF_CATCHMENT),
-    "off, to the other side": (Case((-0.1, 0.25), -np.pi / 2), OFF_CATCHMENT),
-    "aliasing": (Case(NEAR, other_room=True), ALIASING),
-    "aliasing, the other way": (Case((0.0, -0.2), -np.pi / 2, other_room=True), ALIASING),
-    "unlearned": (Case((0.08, 0.06), np.pi), UNLEARNED),
-    "unlearned, elsewhere": (Case((-0.1, 0.02), np.pi), UNLEARNED),
-    "corner": (Case(NEAR, corner=True), CORNER),
-    "corner, elsewhere": (Case((0.02, 0.12), corner=True), CORNER),
+    "unexplained": (Case(NEAR), Cause.UNEXPLAINED),
+    "unexplained, elsewhere": (Case((-0.05, 0.13), -np.pi / 2), Cause.UNEXPLAINED),
+    "occlusion": (Case(NEAR, tube=True), Cause.OCCLUSION),
+    "occlusion, elsewhere": (Case((-0.05, 0.13), -np.pi / 2, tube=True), Cause.OCCLUSION),
+    "off": (Case(AWAY), Cause.OFF_CATCHMENT),
+    "off, to the other side": (Case((-0.1, 0.25), -np.pi / 2), Cause.OFF_CATCHMENT),
+    "aliasing": (Case(NEAR, other_room=True), Cause.ALIASING),
+    "aliasing, the other way": (Case((0.0, -0.2), -np.pi / 2, other_room=True), Cause.ALIASING),
+    "unlearned": (Case((0.08, 0.06), np.pi), Cause.UNLEARNED),
+    "unlearned, elsewhere": (Case((-0.1, 0.02), np.pi), Cause.UNLEARNED),
+    "corner": (Case(NEAR, corner=True), Cause.CORNER),
+    "corner, elsewhere": (Case((0.02, 0.12), corner=True), Cause.CORNER),
 }
-MODELS = ("perfect-memory", "chain", "opponent-perfect-memory", "rbm")
+MODELS = ("perfect-memory", "chain", "opponent-perfect-memory", "rbm units=40 epochs=20")
 
 
-def looks(case: Case, model: str = "perfect-memory", mirror: bool = False):
-    """The first step that an agent takes in a case, and the evidence of it. mirror: everything, the world too, is mirrored."""
+@cache
+def first_step(case: Case, model: str = "perfect-memory", mirror: bool = False) -> tuple[Step, Diagnosis | None]:
+    """The first step of an agent in a case, and its diagnosis. mirror: everything is mirrored, the world too."""
 
     def seen(poses):
         return poses * np.array([1, -1, -1]) if mirror else poses
@@ -158,20 +144,19 @@ def looks(case: Case, model: str = "perfect-memory", mirror: bool = False):
     world = rooms(case.start[:2] if case.tube else None)
     if mirror:
         world = dataclasses.replace(world, triangles=world.triangles * np.float32([1, -1, 1]))
-    learner, poses = make_model(model), seen(case.learned)
-    # What was learned was learned without the tube.
+    # The views were learned without the tube.
     bare = dataclasses.replace(rooms(), triangles=world.triangles[: len(rooms().triangles)])
     with open_renderer(bare, EYE, "cpu") as renderer:
-        learn(learner, GREY, renderer, poses)
+        trained = train(make_model(model), GREY, renderer, seen(case.learned))
     with open_renderer(world, EYE, "cpu") as renderer:
         route = Route(seen(case.route.poses))
-        agent = Agent(renderer=renderer, encoding=GREY, model=learner, route=route, scan=2 * np.pi)
+        agent = Agent(renderer=renderer, trained=trained, route=route, scan_width=2 * np.pi)
         step = next(agent.walk(Pose(*seen(np.array(case.start)).tolist())))
-        return step, Witness(renderer, GREY, route, poses).evidence(step)
+        return step, Diagnostics(renderer, trained, route).examine(step)
 
 
-class Unnamed:
-    """A perfect memory that does not say which view it recognises."""
+class WithoutMatch:
+    """A perfect memory that does not tell which view it recognises."""
 
     def __init__(self):
         self.memory = make_model("perfect-memory")
@@ -185,134 +170,161 @@ class Unnamed:
 
 
 def test_noise_does_not_change_what_was_recognised():
-    """The view that an agent aims at is asked for, whoever has to find it, not one at the heading that noise has made of it."""
+    """The recognised view is the one at the heading that was aimed at, not at the heading after noise, for every model."""
     world = random_world(np.random.default_rng(3))
     route = straight(0.0)
-    found = []
+    diagnoses = []
     with open_renderer(world, EYE, "cpu") as renderer:
-        for memory in (make_model("perfect-memory"), Unnamed()):
-            poses = learn(memory, GREY, renderer, route.resampled(0.1).poses)
-            agent = Agent(renderer=renderer, encoding=GREY, model=memory, route=route, heading_noise=2.0, max_steps=30)
-            witness = Witness(renderer, GREY, route, poses)
-            found.append([witness.evidence(step) for step in agent.walk(agent.start())])
-    assert found[0] == found[1]
-    assert sum(each is not None for each in found[0]) > 5
+        for memory in (make_model("perfect-memory"), WithoutMatch()):
+            trained = train(memory, GREY, renderer, route.resampled(0.1).poses)
+            agent = Agent(
+                renderer=renderer,
+                trained=trained,
+                route=route,
+                body=Body(heading_noise=2.0),
+                stopping=StoppingRules(max_steps=30),
+            )
+            diagnostics = Diagnostics(renderer, trained, route)
+            diagnoses.append([diagnostics.examine(step) for step in agent.walk(agent.start())])
+    assert diagnoses[0] == diagnoses[1]
+    assert sum(each is not None for each in diagnoses[0]) > 5
 
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("name", CASES)
-def test_the_label_is_the_one_cause_that_applies(name, model):
-    case, label = CASES[name]
-    step, evidence = looks(case, model)
+def test_the_cause_is_the_one_that_applies(name, model):
+    case, cause = CASES[name]
+    step, diagnosis = first_step(case, model)
     assert (step.match is None) == (model not in ("perfect-memory", "chain"))
-    assert evidence is not None
-    assert cause(evidence) == label
-    assert in_words(evidence).startswith(label)
-    # Exactly one of the thresholds is passed, the label's.
+    assert diagnosis is not None
+    assert diagnosis.cause == cause
+    assert str(diagnosis).startswith(cause)
+    # Exactly one threshold is passed, that of the cause.
     passed = {
-        OCCLUSION: evidence.covered > COVERED, OFF_CATCHMENT: evidence.nearest > CATCHMENT, ALIASING: evidence.recognised > FAR,
-        UNLEARNED: abs(evidence.error) > REVERSE, CORNER: evidence.turning > TURNING,
-    }  # fmt: skip
-    assert [each for each, true in passed.items() if true] == [label] * (label != UNEXPLAINED)
+        Cause.OCCLUSION: diagnosis.covered > failures.MAX_COVERED,
+        Cause.OFF_CATCHMENT: diagnosis.nearest > CATCHMENT,
+        Cause.ALIASING: diagnosis.recognised > FAR,
+        Cause.UNLEARNED: abs(diagnosis.error) > failures.REVERSE,
+        Cause.CORNER: diagnosis.turning > failures.CORNER_ANGLE,
+    }
+    assert [each for each, true in passed.items() if true] == [cause] * (cause != Cause.UNEXPLAINED)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_evidence_is_what_the_room_was_built_for(name):
+def test_a_diagnosis_measures_what_the_room_was_built_for(name):
     case, _ = CASES[name]
-    step, evidence = looks(case)
-    assert evidence is not None
+    step, diagnosis = first_step(case)
+    assert diagnosis is not None
     away = np.hypot(*(case.learned[:, :2] - case.start[:2]).T)
-    assert np.isclose(evidence.nearest, away.min())
-    assert np.isclose(evidence.recognised, away[-1])  # of two, the last is the one that is the same
-    assert abs(abs(evidence.error) - abs(case.turn)) < np.radians(2 if case.tube else 0.5)
-    assert evidence.error == step.error
-    assert np.isclose(evidence.covered, 0.6 if case.tube else 0.0, atol=0.01)
-    assert np.isclose(evidence.turning, np.arctan2(0.26, 0.04) if case.corner else 0.0, atol=1e-6)
+    assert np.isclose(diagnosis.nearest, away.min())
+    assert np.isclose(diagnosis.recognised, away[-1])  # of two, the last is the one that is equal
+    assert abs(abs(diagnosis.error) - abs(case.turn)) < np.radians(2 if case.tube else 0.5)
+    assert diagnosis.error == step.error
+    assert np.isclose(diagnosis.covered, 0.6 if case.tube else 0.0, atol=0.01)
+    assert np.isclose(diagnosis.turning, np.arctan2(0.26, 0.04) if case.corner else 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_mirrored_world_gives_the_same_label(name):
-    case, label = CASES[name]
-    (_, evidence), (_, image) = looks(case), looks(case, mirror=True)
-    assert evidence is not None
+def test_a_mirrored_world_gives_the_same_cause(name):
+    case, cause = CASES[name]
+    (_, diagnosis), (_, image) = first_step(case), first_step(case, mirror=True)
+    assert diagnosis is not None
     assert image is not None
-    assert cause(image) == label
-    assert np.isclose(image.covered, evidence.covered)
-    assert np.isclose(image.nearest, evidence.nearest)
-    assert np.isclose(image.recognised, evidence.recognised)
-    assert np.isclose(image.turning, evidence.turning)
-    assert abs(abs(image.error) - abs(evidence.error)) < 1e-3
+    assert image.cause == cause
+    assert np.isclose(image.covered, diagnosis.covered)
+    assert np.isclose(image.nearest, diagnosis.nearest)
+    assert np.isclose(image.recognised, diagnosis.recognised)
+    assert np.isclose(image.turning, diagnosis.turning)
+    assert abs(abs(image.error) - abs(diagnosis.error)) < 1e-3
 
 
-def test_a_good_step_has_no_evidence():
-    assert looks(Case(NEAR, turn=0.0))[1] is None
-    # 60 degrees off the route's heading, but on the way back to it: 0.3 m ahead from 0.4 m beside it.
+def test_a_good_step_has_no_diagnosis():
+    assert first_step(Case(NEAR, turn=0.0))[1] is None
+    # 60 degrees off the route's heading, but on the way back to it: 0.3 m ahead, from 0.4 m to its side.
     case = Case(NEAR, turn=0.0)
     with open_renderer(rooms(), EYE, "cpu") as renderer:
-        memory, back = make_model("perfect-memory"), np.array([(*case.start[:2], np.radians(-60))])
-        learn(memory, GREY, renderer, back)
-        for beside, good in ((0.4, True), (0.0, False), (-0.4, False)):
-            route = straight(case.start.y - beside)
-            agent = Agent(renderer=renderer, encoding=GREY, model=memory, route=route, scan=2 * np.pi)
+        back = np.array([(*case.start[:2], np.radians(-60))])
+        trained = train(make_model("perfect-memory"), GREY, renderer, back)
+        for aside, good in ((0.4, True), (0.0, False), (-0.4, False)):
+            route = straight(case.start.y - aside)
+            agent = Agent(renderer=renderer, trained=trained, route=route, scan_width=2 * np.pi)
             step = next(agent.walk(case.start))
             assert abs(step.error) > POOR
-            assert (Witness(renderer, GREY, route, back).evidence(step) is None) == good
+            assert (Diagnostics(renderer, trained, route).examine(step) is None) == good
 
 
-def test_without_the_places_of_views_the_evidence_is_what_remains():
+def test_without_the_poses_of_views_the_rest_is_measured():
     case, _ = CASES["off"]
-    step, _ = looks(case)
+    step, _ = first_step(case)
     with open_renderer(rooms(), EYE, "cpu") as renderer:
-        evidence = Witness(renderer, GREY, case.route).evidence(step)
-    assert evidence is not None
-    assert (evidence.nearest, evidence.recognised) == (None, None)
-    assert cause(evidence) == UNEXPLAINED
+        model = train(make_model("perfect-memory"), GREY, renderer, case.learned).model
+        trained = TrainedModel(model=model, encoding=GREY, eye=EYE, poses=None)
+        diagnosis = Diagnostics(renderer, trained, case.route).examine(step)
+    assert diagnosis is not None
+    assert (diagnosis.nearest, diagnosis.recognised) == (None, None)
+    assert diagnosis.cause == Cause.UNEXPLAINED
 
 
-numbers = st.floats(allow_nan=False)
-evidences = st.builds(
-    Evidence, covered=st.floats(0, 1), nearest=st.none() | st.floats(0, 10), recognised=st.none() | st.floats(0, 10),
-    error=st.floats(-np.pi, np.pi), turning=st.floats(0, np.pi),
-)  # fmt: skip
+POSES = np.column_stack([np.linspace(-2.3, -1.7, 4), np.zeros(4), np.zeros(4)])
 
 
-@given(evidences)
-def test_left_and_right_have_the_same_cause(evidence):
-    assert cause(evidence) in CAUSES
-    assert cause(evidence) == cause(dataclasses.replace(evidence, error=-evidence.error))
-    assert in_words(evidence).startswith(cause(evidence))
+@pytest.mark.xfail(
+    strict=True, reason="TrainedModel does not check poses yet; the rewrite of models/files.py makes it do so"
+)
+@pytest.mark.parametrize(
+    ("model", "poses"),
+    [
+        ("perfect-memory", POSES[:3]),
+        ("perfect-memory", np.repeat(POSES, 2, axis=0)),
+        ("chain", POSES[:3]),
+        ("visual-compass", POSES[:3]),  # it keeps the last view
+        ("perfect-memory", np.full((4, 3), np.nan)),
+    ],
+)
+def test_the_poses_of_another_training_set_are_refused(model, poses):
+    """So a recognised view cannot be looked up at the pose of another one."""
+    with open_renderer(rooms(), EYE, "cpu") as renderer:
+        learned = train(make_model(model), GREY, renderer, POSES).model
+    with pytest.raises(InputError, match="poses"):
+        TrainedModel(model=learned, encoding=GREY, eye=EYE, poses=poses)
 
 
-@given(evidences, st.data())
-def test_what_comes_first_wins(evidence, data):
-    """Adding what makes the view useless never gives way to what only misleads."""
-    worse = dataclasses.replace(evidence, nearest=data.draw(st.floats(CATCHMENT * 1.01, 10)))
-    assert CAUSES.index(cause(worse)) <= CAUSES.index(cause(evidence))
-    assert cause(worse) in (OCCLUSION, OFF_CATCHMENT)
-    assert cause(dataclasses.replace(worse, covered=1.0)) == OCCLUSION
+diagnoses = st.builds(
+    Diagnosis,
+    covered=st.floats(0, 1),
+    nearest=st.none() | st.floats(0, 10),
+    recognised=st.none() | st.floats(0, 10),
+    error=st.floats(-np.pi, np.pi),
+    turning=st.floats(0, np.pi),
+)
+ORDER = list(Cause)  # of several causes that apply, the first is taken
 
 
-def test_thresholds_are_what_the_documentation_says():
+@given(diagnoses)
+def test_left_and_right_have_the_same_cause(diagnosis):
+    assert diagnosis.cause == dataclasses.replace(diagnosis, error=-diagnosis.error).cause
+    assert str(diagnosis).startswith(diagnosis.cause)
+
+
+@given(diagnoses, st.data())
+def test_a_useless_view_comes_before_a_misleading_one(diagnosis, data):
+    worse = dataclasses.replace(diagnosis, nearest=data.draw(st.floats(CATCHMENT * 1.01, 10)))
+    assert ORDER.index(worse.cause) <= ORDER.index(diagnosis.cause)
+    assert worse.cause in (Cause.OCCLUSION, Cause.OFF_CATCHMENT)
+    assert dataclasses.replace(worse, covered=1.0).cause == Cause.OCCLUSION
+
+
+def test_the_documentation_has_the_thresholds():
     text = (Path(__file__).parents[1] / "docs" / "failures.md").read_text()
-    said = {name: float(number) for name, number in re.findall(r"\| `([A-Z]+)` \| ([0-9.]+)", text)}
-    here = {
-        "OCCLUDER": OCCLUDER,
-        "COVERED": COVERED,
-        "CATCHMENT": CATCHMENT,
-        "FAR": FAR,
-        "REACH": failures.REACH,
-        "SOUND": failures.SOUND,
-    }
-    here |= {"POOR": np.degrees(POOR), "REVERSE": np.degrees(REVERSE), "TURNING": np.degrees(TURNING)}
-    assert said == pytest.approx(here)
-    assert all(f"**{label}**" in text for label in CAUSES)
+    documented = {name: float(number) for name, number in re.findall(r"\| `([A-Z_]+)` \| ([0-9.]+)", text)}
+    angles = {name: np.degrees(getattr(failures, name)) for name in ("POOR", "REVERSE", "CORNER_ANGLE")}
+    others = ("OCCLUDER_DISTANCE", "MAX_COVERED", "CATCHMENT", "FAR", "CHORD", "RECOVERY")
+    assert documented == pytest.approx(angles | {name: getattr(failures, name) for name in others})
+    assert all(f"**{cause}**" in text for cause in Cause)
 
 
-# Of whole walks.
-
-
-class Ahead:
-    """A model that keeps no views and always turns by so many columns."""
+class FixedTurn:
+    """A model that keeps no views and always turns by the same number of columns."""
 
     def __init__(self, columns: int):
         self.columns = columns
@@ -326,62 +338,75 @@ class Ahead:
         return scan
 
 
-def walked(start: Pose, *, columns: int = 0, **settings) -> tuple[list, Trajectory]:
-    """Steps and trajectory of an agent in the first room, on a straight route through its middle where views were learned."""
+def walked(start: Pose, *, columns: int = 0, noise: float = 0.0, **stopping) -> tuple[list[Step], Trajectory]:
+    """Steps and trajectory of a walk in the first room. Its route, where views were learned, is straight through the middle."""
     route = Route.through(np.column_stack([np.linspace(-2.5, -1.5, 51), np.zeros(51)]))
+    steps, trajectory = [], Trajectory()
     with open_renderer(rooms(), EYE, "cpu") as renderer:
-        agent = Agent(renderer=renderer, encoding=GREY, model=Ahead(columns), route=route, scan=2 * np.pi, **settings)
-        witness, steps, trajectory = Witness(renderer, GREY, route, route.poses), [], Trajectory()
+        trained = TrainedModel(model=FixedTurn(columns), encoding=GREY, eye=EYE, poses=route.poses)
+        agent = Agent(
+            renderer=renderer,
+            trained=trained,
+            route=route,
+            scan_width=2 * np.pi,
+            body=Body(heading_noise=noise),
+            stopping=StoppingRules(**stopping),
+        )
+        diagnostics = Diagnostics(renderer, trained, route)
         for step in agent.walk(start):
             steps.append(step)
-            trajectory.add(step, witness.evidence(step))
+            trajectory.add(step, diagnostics.examine(step))
     return steps, trajectory
 
 
-def test_a_failed_step_has_evidence_however_good_its_heading():
-    steps, trajectory = walked(Pose(-2.5, 0.28, 0.1), lost=0.3)  # walks away from the route, a little
-    assert steps[-1].reason == steps[-1].failure == LOST
+def test_a_failed_step_has_a_diagnosis_even_with_a_good_heading():
+    steps, trajectory = walked(Pose(-2.5, 0.28, 0.1), max_deviation=0.3)  # walks away from the route, a little
+    assert steps[-1].reason == steps[-1].failure == StopReason.LOST
     assert not any(step.failure for step in steps[:-1])
     assert abs(steps[-1].error) < POOR
-    assert trajectory.column("cause") == [""] * (len(steps) - 1) + [OFF_CATCHMENT]
+    assert trajectory.column("cause") == [""] * (len(steps) - 1) + [Cause.OFF_CATCHMENT]
     summary = trajectory.summary()
-    assert (summary["cause"], summary["poor_steps"], summary["causes"]) == (OFF_CATCHMENT, 1, {OFF_CATCHMENT: 1})
+    assert summary["cause"] == Cause.OFF_CATCHMENT
+    assert (summary["poor_steps"], summary["causes"]) == (1, {Cause.OFF_CATCHMENT: 1})
 
 
 def test_an_arrived_walk_has_no_cause_and_one_that_was_put_back_has():
     steps, trajectory = walked(Pose(-2.5, 0.0, 0.0))
-    assert steps[-1].reason == ARRIVED
+    assert steps[-1].reason == StopReason.ARRIVED
     assert steps[-1].failure is None
     assert trajectory.summary()["cause"] is None
     assert trajectory.summary()["causes"] == {}
-    steps, trajectory = walked(Pose(-2.5, 0.28, 0.1), lost=0.3, reset_when_lost=True)
-    assert steps[-1].reason == ARRIVED
+    steps, trajectory = walked(Pose(-2.5, 0.28, 0.1), max_deviation=0.3, put_back=True)
+    assert steps[-1].reason == StopReason.ARRIVED
     failed = [step.index for step in steps if step.failure]
     assert failed == [step.index - 1 for step in steps if step.reset]
     assert len(failed) == 1
     assert all(step.reason is None for step in steps[:-1])
-    assert trajectory.summary()["cause"] == OFF_CATCHMENT
+    assert trajectory.summary()["cause"] == Cause.OFF_CATCHMENT
+
+
+A, C, OFF, X, U = Cause.ALIASING, Cause.CORNER, Cause.OFF_CATCHMENT, Cause.UNEXPLAINED, Cause.UNLEARNED
 
 
 @pytest.mark.parametrize(
     ("along", "causes", "failed", "expected"),
     [
         ([0, 1, 2], ["", "", ""], [0, 0, 0], None),
-        ([0, 1, 2], ["", CORNER, ""], [0, 0, 0], None),  # it arrived in spite of a poor step
-        ([0, 1, 1], ["", "", CORNER], [0, 0, 1], CORNER),
-        # What came before half a metre of good steps has nothing to do with it.
-        ([0, 0.1, 0.2, 0.9, 1], [ALIASING, ALIASING, "", "", CORNER], [0, 0, 0, 0, 1], CORNER),
-        ([0, 0.1, 0.2, 0.3, 0.4], [ALIASING, ALIASING, "", "", CORNER], [0, 0, 0, 0, 1], ALIASING),
-        # Going back and forth is no progress.
-        ([1, 1.1, 0.2, 0.9, 1], [ALIASING, ALIASING, "", "", CORNER], [0, 0, 0, 0, 1], ALIASING),
-        # Led off by something else, or off from the beginning.
-        ([0, 0.1, 0.1, 0.1], [CORNER, OFF_CATCHMENT, OFF_CATCHMENT, OFF_CATCHMENT], [0, 0, 0, 1], CORNER),
-        ([0, 0.1, 0.1, 0.1], [OFF_CATCHMENT, OFF_CATCHMENT, OFF_CATCHMENT, CORNER], [0, 0, 0, 1], OFF_CATCHMENT),
-        ([0, 0, 0], [UNEXPLAINED, UNEXPLAINED, UNLEARNED], [0, 0, 1], UNLEARNED),
-        ([0, 0, 0], [UNEXPLAINED, "", UNEXPLAINED], [0, 0, 1], UNEXPLAINED),
-        # A cause a failure.
-        ([0, 0, 0, 0, 0], [ALIASING, ALIASING, ALIASING, CORNER, CORNER], [0, 0, 1, 1, 1], CORNER),
-        ([0, 0, 0], ["", "", ""], [0, 0, 1], None),  # nobody looked into it
+        ([0, 1, 2], ["", C, ""], [0, 0, 0], None),  # it arrived in spite of a poor step
+        ([0, 1, 1], ["", "", C], [0, 0, 1], C),
+        # What came before half a metre of good steps does not count.
+        ([0, 0.1, 0.2, 0.9, 1], [A, A, "", "", C], [0, 0, 0, 0, 1], C),
+        ([0, 0.1, 0.2, 0.3, 0.4], [A, A, "", "", C], [0, 0, 0, 0, 1], A),
+        # Going back and forth is not progress.
+        ([1, 1.1, 0.2, 0.9, 1], [A, A, "", "", C], [0, 0, 0, 0, 1], A),
+        # Led off by something else, and off from the beginning.
+        ([0, 0.1, 0.1, 0.1], [C, OFF, OFF, OFF], [0, 0, 0, 1], C),
+        ([0, 0.1, 0.1, 0.1], [OFF, OFF, OFF, C], [0, 0, 0, 1], OFF),
+        ([0, 0, 0], [X, X, U], [0, 0, 1], U),
+        ([0, 0, 0], [X, "", X], [0, 0, 1], X),
+        # One cause for each failure.
+        ([0, 0, 0, 0, 0], [A, A, A, C, C], [0, 0, 1, 1, 1], C),
+        ([0, 0, 0], ["", "", ""], [0, 0, 1], None),  # nothing was measured
     ],
 )
 def test_the_cause_of_a_walk(along, causes, failed, expected):
@@ -390,7 +415,7 @@ def test_the_cause_of_a_walk(along, causes, failed, expected):
 
 def test_equal_walks_leave_equal_bytes(tmp_path):
     for name in ("a.csv", "b.csv"):
-        _, trajectory = walked(Pose(-2.3, 0.0, 0.0), columns=9, lost=0.3, patience=1.0, heading_noise=0.1)
+        _, trajectory = walked(Pose(-2.3, 0.0, 0.0), columns=9, max_deviation=0.3, patience=1.0, noise=0.1)
         trajectory.write(tmp_path / name)
         assert trajectory.summary()["poor_steps"] > 3
     written = (tmp_path / "a.csv").read_bytes()
@@ -405,24 +430,24 @@ def test_a_recording_shows_the_cause_where_it_happens(tmp_path):
     from test_recording import rerun
 
     case, _ = CASES["aliasing"]
-    step, evidence = looks(case)
-    with Recording(tmp_path / "r.rrd", rooms(), case.route) as recording:
-        recording.log(step, evidence)
+    step, diagnosis = first_step(case)
+    with (
+        open_renderer(rooms(), EYE, "cpu") as renderer,
+        Recording(tmp_path / "r.rrd", renderer, case.route) as recording,
+    ):
+        recording.log(step, diagnosis)
     rerun("rrd", "verify", tmp_path / "r.rrd")
     printed = rerun("rrd", "print", "-vvv", tmp_path / "r.rrd")
     assert "step 0: aliasing, the view it recognises was learned 4.00 m away" in printed
     assert "/world/causes/aliasing" in printed
 
 
-# What is very near to an eye.
-
-
 @pytest.mark.parametrize("double_sided", [True, False])
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_near_is_what_a_renderer_draws_of_it(seed, double_sided):
-    """Where all of a world is near, its share of a view is what the scanlines draw: alpha."""
+def test_the_share_covered_is_what_a_renderer_draws(seed, double_sided):
+    """Where the whole world is near, its share of a view is the alpha that the scanlines draw."""
     world = random_world(seed, n=400, ground=False, double_sided=double_sided)
-    eye = attrs.evolve(EYE, width=72, height=15, samples=1)
+    eye = Eye(width=72, height=15, samples=1)
     within = 10.0  # all of it
     with open_renderer(world, eye, "cpu") as renderer:
         for x, y, _ in random_poses(4, seed):
@@ -432,7 +457,7 @@ def test_what_is_near_is_what_a_renderer_draws_of_it(seed, double_sided):
 
 @pytest.mark.parametrize("double_sided", [True, False])
 def test_a_wall_covers_what_is_within_the_distance(double_sided):
-    eye = attrs.evolve(EYE, top=np.radians(2.5), bottom=np.radians(-2.5), height=1)
+    eye = Eye(width=72, height=1, samples=2, top=np.radians(2.5), bottom=np.radians(-2.5))
     wall = np.array(quad((-3.0, 0.03), (3.0, 0.03), -1, 1))  # its front towards the south
     world = world_of(wall, np.zeros((2, 3)), double_sided=double_sided)
     share = 2 * np.arccos(0.03 / 0.05) / (2 * np.pi)
@@ -443,12 +468,11 @@ def test_a_wall_covers_what_is_within_the_distance(double_sided):
     corners = [(x, 0.03) for x in np.linspace(-3, 3, 200)]
     cut = [each for a, b in pairwise(corners) for each in quad(a, b, -1, 1)]
     finer = world_of(np.array(cut), np.zeros((len(cut), 3)), double_sided=double_sided)
-    assert covered_within(finer, eye, Pose(0.0, 0.0, 1.0), 0.05) == covered_within(
-        world, eye, Pose(0.0, 0.0, 1.0), 0.05
-    )
+    covered, again = (covered_within(each, eye, Pose(0.0, 0.0, 1.0), 0.05) for each in (world, finer))
+    assert covered == again
 
 
-def test_the_ground_is_no_occluder():
+def test_the_ground_does_not_occlude():
     world = world_of(np.empty((0, 3, 3)), np.empty((0, 3)))
     assert len(world.surfaces()[0])  # there is ground, nearer than that
     assert covered_within(world, EYE, Pose(0.0, 0.0, 0.0), 1.0) == 0

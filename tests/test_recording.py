@@ -1,33 +1,57 @@
-"""Recordings, in the real rerun: they verify, they open, and a crash leaves what there was."""
+"""Recordings, checked by rerun itself: they verify, they open, and a crash leaves what was recorded before it."""
 
+import dataclasses
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from tussock.navigation.agent import Agent
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import PerfectMemory
-from tussock.navigation.recording.log import Recording, viewer_program
+from tussock.navigation.recording import log
+from tussock.navigation.recording.log import Recording
 from tussock.navigation.recording.run_folder import play
-from tussock.navigation.training import learn, training_poses
-from tussock.navigation.walk import Agent
+from tussock.navigation.recording.viewer import viewer_program
+from tussock.navigation.training import train, training_poses
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, InputError, MissingDependencyError
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
 RERUN = viewer_program()
-ENTITIES = (
-    "/world/mesh", "/world/route", "/world/path", "/world/agent", "/view", "/recognised", "/familiarity", "/deviation/m", "/error/degrees",
-)  # fmt: skip
+PER_STEP = {  # columns with a row for each step, but for the path, which has none for the first
+    "/world/agent@Arrows3D:origins",
+    "/world/path@LineStrips3D:strips",
+    "/world/recognised@Arrows3D:origins",
+    "/view@Image:buffer",
+    "/recognised@Image:buffer",
+    "/familiarity@BarChart:values",
+    "/deviation/m@Scalars:scalars",
+    "/error/degrees@Scalars:scalars",
+}
+ONCE = {
+    "/world/mesh@Mesh3D:vertex_positions",
+    "/world/route@LineStrips3D:strips",
+    "/world/goal@Points3D:positions",
+    "/world/learned_views@Points3D:positions",
+    "/view@Image:format",
+    "/recognised@Image:format",
+    "/familiarity@BarChart:abscissa",
+}
 
 
 def rerun(*arguments: str | Path) -> str:
@@ -38,38 +62,93 @@ def rerun(*arguments: str | Path) -> str:
     return done.stdout + done.stderr
 
 
-@pytest.fixture(scope="module")
-def walk():
-    """An agent at its start, and the poses it knows."""
-    with open_renderer(World.generate("tiny", 2), Eye(width=180, height=40), "cpu") as renderer:
-        route = generate_route(renderer.world, 2).resampled(0.05)
-        encoding, model = Encoding.named("edges"), PerfectMemory()
-        poses = learn(model, encoding, renderer, training_poses(route, learning_walk=0.2))
-        yield Agent(renderer=renderer, encoding=encoding, model=model, route=route), poses
+def rows_of(recording: Path) -> Counter[str]:
+    """The number of rows of each column of a recording."""
+    rows: Counter[str] = Counter()
+    for count, columns in re.findall(
+        r"with (\d+) rows .*data columns: \[(.*)\]", rerun("rrd", "print", "-v", recording)
+    ):
+        for column in columns.split():
+            rows[column] += int(count)
+    return rows
 
 
 @pytest.fixture(scope="module")
-def recorded(walk, tmp_path_factory):
-    agent, poses = walk
-    path = tmp_path_factory.mktemp("run") / "recording.rrd"
-    with Recording(
-        path, agent.renderer.world, agent.route, renderer=agent.renderer, training_poses=poses, title="a walk"
-    ) as recording:
-        for step in agent.walk(agent.start(0.05)):
+def agent():
+    """An agent that has learned a route."""
+    with open_renderer(World.generate("tiny", 2), Eye(width=120, height=25), "cpu") as renderer:
+        route = generate_route(renderer.world, 2)
+        trained = train(
+            PerfectMemory(), Encoding.named("edges"), renderer, training_poses(route, 0.05, learning_walk=0.2)
+        )
+        yield Agent(renderer=renderer, trained=trained, route=route)
+
+
+def record(path: Path, agent: Agent, **settings) -> int:
+    """Record a walk along the route of an agent; returns the number of looks."""
+    with Recording(path, agent.renderer, agent.route, **settings) as recording:
+        for looks, step in enumerate(agent.walk(agent.start(0.05)), start=1):  # noqa: B007
             recording.log(step)
-    return path
+    return looks
 
 
-def test_a_recording_verifies_and_holds_all_it_should(recorded):
-    rerun("rrd", "verify", recorded)
-    printed = rerun("rrd", "print", "-v", recorded)
-    assert all(entity in printed for entity in ENTITIES)
-    assert "/viewport" in printed  # the blueprint
+@pytest.fixture(scope="module")
+def recorded(agent, tmp_path_factory):
+    """A recording of a walk, written step by step, and its number of looks."""
+    path = tmp_path_factory.mktemp("run") / "recording.rrd"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(log, "FLUSH_SECONDS", 0.0)
+        return path, record(path, agent, training_poses=agent.trained.poses, title="a walk")
 
 
-def test_a_recording_opens_in_the_viewer(walk, recorded, tmp_path):
+@pytest.fixture
+def port() -> int:
+    """A free port of this machine."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+@contextmanager
+def viewer_at(port: int, received: Path) -> Iterator[subprocess.Popen]:
+    """A viewer that listens at a port and saves what it receives."""
+    command = [RERUN, "--bind", "127.0.0.1", "--port", str(port), "--save", str(received)]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env={"RERUN_ANALYTICS": "false"}) as viewer:
+        try:
+            wait_until(lambda: listens(port))
+            yield viewer
+        finally:
+            viewer.terminate()
+
+
+def address(port: int) -> str:
+    return f"rerun+http://127.0.0.1:{port}/proxy"
+
+
+def test_a_recording_verifies_and_holds_every_step(recorded):
+    path, looks = recorded
+    rerun("rrd", "verify", path)
+    rows = rows_of(path)
+    assert {column: rows[column] for column in ONCE} == dict.fromkeys(ONCE, 1)
+    per_step = dict.fromkeys(PER_STEP, looks) | {"/world/path@LineStrips3D:strips": looks - 1}
+    assert {column: rows[column] for column in PER_STEP} == per_step
+    assert "/viewport" in rerun("rrd", "print", "-v", path)  # the blueprint
+
+
+def test_steps_without_a_view_and_a_scan_are_recorded(agent, tmp_path):
+    with Recording(tmp_path / "r.rrd", agent.renderer, agent.route, training_poses=agent.trained.poses) as recording:
+        for step in islice(agent.walk(agent.start()), 3):
+            recording.log(dataclasses.replace(step, view=None, familiarity=None, scanned=None, match=None))
+    rerun("rrd", "verify", tmp_path / "r.rrd")
+    rows = rows_of(tmp_path / "r.rrd")
+    assert rows["/world/agent@Arrows3D:origins"] == 3
+    assert not any(column.startswith(("/familiarity", "/recognised")) for column in rows)
+
+
+@pytest.mark.slow
+def test_a_recording_opens_in_the_viewer(agent, recorded, tmp_path):
     try:
-        play(recorded, screenshot=tmp_path / "viewer.png")
+        play(recorded[0], screenshot=tmp_path / "viewer.png")
     except InputError as error:
         if "Vulkan" in str(error) and not os.environ.get("TUSSOCK_REQUIRE_GL"):
             pytest.skip(str(error))
@@ -77,41 +156,39 @@ def test_a_recording_opens_in_the_viewer(walk, recorded, tmp_path):
     picture = cv2.imread(str(tmp_path / "viewer.png"))
     height, width = picture.shape[:2]
     views = picture[height // 25 : height // 3, : width // 2]
-    sky = np.array(walk[0].renderer.world.sky_rgb)[::-1]
+    sky = np.array(agent.renderer.world.sky_rgb)[::-1]
     assert (np.abs(views.astype(int) - sky).max(axis=-1) <= 2).mean() > 0.05  # the panoramas are shown
     assert [path.name for path in tmp_path.iterdir()] == ["viewer.png"]
 
 
-def test_a_killed_walk_leaves_a_recording_up_to_there(tmp_path):
-    script = f"""
+KILLED = """
 import os, signal, sys
 from pathlib import Path
-sys.path.insert(0, {str(Path(__file__).parent)!r})
-from tussock.navigation.walk import Agent
-from tussock.navigation.encoding import Encoding
-from tussock.navigation.models import PerfectMemory
-from tussock.navigation.recording import log as recordings
-from render import Eye, open_renderer
-from tussock.world import World
-from tussock.world.routes import generate_route
-renderer = open_renderer(World.generate("tiny", 2), Eye(width=180, height=40), "cpu")
-route = generate_route(renderer.world, 2).resampled(0.05)
-encoding = Encoding.named("edges")
-model = PerfectMemory().fit(encoding(renderer.render(route.poses)))
-agent = Agent(renderer=renderer, encoding=encoding, model=model, route=route)
-recordings.FLUSH_SECONDS = 0.0
-recording = recordings.Recording(Path({str(tmp_path / "cut.rrd")!r}), renderer.world, route, renderer=renderer, training_poses=route.poses)
-for step in agent.walk(agent.start()):
-    recording.log(step)
-    if step.index == 10:
-        os.kill(os.getpid(), signal.SIGKILL)
+from tussock import Agent, Encoding, Eye, PerfectMemory, World, generate_route, open_renderer, train
+from tussock.navigation.recording import log
+
+log.FLUSH_SECONDS = 0.0
+with open_renderer(World.generate("tiny", 2), Eye(width=120, height=25), "cpu") as renderer:
+    route = generate_route(renderer.world, 2)
+    trained = train(PerfectMemory(), Encoding.named("edges"), renderer, route.resampled(0.05).poses)
+    agent = Agent(renderer=renderer, trained=trained, route=route)
+    recording = log.Recording(Path(sys.argv[1]), renderer, route, training_poses=trained.poses)
+    for step in agent.walk(agent.start()):
+        recording.log(step)
+        if step.index == 10:
+            os.kill(os.getpid(), signal.SIGKILL)
 """
-    assert subprocess.run([sys.executable, "-c", script]).returncode == -signal.SIGKILL
-    # What is there is whole: rerun adds the index that only a finished recording has.
+
+
+@pytest.mark.slow
+def test_a_killed_walk_leaves_a_recording_up_to_there(tmp_path):
+    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "cut.rrd")])
+    assert done.returncode == -signal.SIGKILL
+    # It is complete but for the index that only a finished recording has; rerun adds that.
     rerun("rrd", "merge", tmp_path / "cut.rrd", "-o", tmp_path / "whole.rrd")
     rerun("rrd", "verify", tmp_path / "whole.rrd")
-    printed = rerun("rrd", "print", "-v", tmp_path / "whole.rrd")
-    assert all(entity in printed for entity in ENTITIES)
+    rows = rows_of(tmp_path / "whole.rrd")
+    assert min(rows[column] for column in PER_STEP) == 10  # the path; 11 looks were recorded
 
 
 def wait_until(true, seconds: float = 20) -> None:
@@ -126,55 +203,38 @@ def listens(port: int) -> bool:
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
-def test_a_live_walk_reaches_a_running_viewer(walk, tmp_path):
-    agent, _ = walk
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    url = f"rerun+http://127.0.0.1:{port}/proxy"
-    with pytest.raises(InputError, match="no rerun viewer listens"):
-        Recording(tmp_path / "a.rrd", agent.renderer.world, agent.route, live=url)
+def test_a_live_walk_reaches_a_running_viewer(agent, tmp_path, port):
     received = tmp_path / "received.rrd"
-    command = [RERUN, "--bind", "127.0.0.1", "--port", str(port), "--save", str(received)]
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env={"RERUN_ANALYTICS": "false"}) as viewer:
-        try:
-            wait_until(lambda: listens(port))
-            with Recording(tmp_path / "b.rrd", agent.renderer.world, agent.route, live=url) as recording:
-                for step in agent.walk(agent.start()):
-                    recording.log(step)
-            size = (tmp_path / "b.rrd").stat().st_size
-            wait_until(lambda: received.exists() and received.stat().st_size > 0.5 * size)
-        finally:
-            viewer.terminate()
-    assert "/world/path" in rerun("rrd", "print", "-v", received)
+    with viewer_at(port, received):
+        record(tmp_path / "b.rrd", agent, live=address(port))
+        size = (tmp_path / "b.rrd").stat().st_size
+        wait_until(lambda: received.exists() and received.stat().st_size > 0.5 * size)
+    assert rows_of(received)["/world/path@LineStrips3D:strips"] > 0
 
 
-def test_playing_what_is_not_there_is_refused(tmp_path, recorded, monkeypatch):
-    with pytest.raises(InputError, match="no recording"):
+def test_a_live_walk_without_a_viewer_is_refused(agent, tmp_path, port):
+    with pytest.raises(MissingDependencyError, match=f"127.0.0.1:{port}.*start one"):
+        Recording(tmp_path / "a.rrd", agent.renderer, agent.route, live=address(port))
+
+
+def test_a_recording_that_cannot_be_played_is_refused(tmp_path, recorded, monkeypatch):
+    with pytest.raises(FileError, match=f"{tmp_path}.*folder of a run"):
         play(tmp_path)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(InputError, match="--web"):
-        play(recorded)
+    with pytest.raises(MissingDependencyError, match="--web"):
+        play(recorded[0])
 
 
-def test_a_walk_goes_on_when_its_live_viewer_is_closed(walk, tmp_path):
-    agent, _ = walk
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [RERUN, "--bind", "127.0.0.1", "--port", str(port), "--save", str(tmp_path / "received.rrd")]
-
-    def walk_on(viewer: subprocess.Popen, url: str) -> None:
-        with Recording(tmp_path / "r.rrd", agent.renderer.world, agent.route, live=url) as recording:
+def test_a_walk_goes_on_when_its_live_viewer_is_closed(agent, tmp_path, port):
+    def walk_on(viewer: subprocess.Popen) -> None:
+        with Recording(tmp_path / "r.rrd", agent.renderer, agent.route, live=address(port)) as recording:
             for step in agent.walk(agent.start()):
                 recording.log(step)
                 if step.index == 5:
                     viewer.kill()
                     viewer.wait()
 
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env={"RERUN_ANALYTICS": "false"}) as viewer:
-        wait_until(lambda: listens(port))
-        with pytest.warns(UserWarning, match="viewer is gone"):
-            walk_on(viewer, f"rerun+http://127.0.0.1:{port}/proxy")
+    with viewer_at(port, tmp_path / "received.rrd") as viewer, pytest.warns(UserWarning, match="viewer is gone"):
+        walk_on(viewer)
     rerun("rrd", "verify", tmp_path / "r.rrd")

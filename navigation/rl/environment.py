@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 ID = "tussock/RouteFollowing-v0"
-ROUNDING = 1e-4  # share by which encoded views may leave the bounds that they have but for rounding
+ROUNDING = 1e-4  # encoded views may leave their bounds by this share of the greatest magnitude, which is 1 or more
 
 
 class RouteFollowing(gymnasium.Env):
@@ -189,7 +189,8 @@ def _spaces(task: RouteTask) -> tuple[Box, Box]:
         seen = Box(0, 255, (eye.height, eye.width, 3), np.uint8)
     else:
         shape, low, high = task.chain.bounds(eye.height, eye.width)
-        seen = Box(low * (1 + ROUNDING), high * (1 + ROUNDING), shape, np.float32)
+        margin = ROUNDING * max([1.0, *(abs(end) for end in (low, high) if np.isfinite(end))])
+        seen = Box(low - margin, high + margin, shape, np.float32)
     return seen, Box(np.array([-1, 0], np.float32), np.array([1, 1], np.float32))
 
 

@@ -23,9 +23,11 @@ from ..encoding import Encoding
 from ..experiment import Experiment
 from ..steering.navigator import Motion
 from ..stopping import StoppingRules, StopReason
+from ..surroundings import Surroundings
 from ..training import training_poses, training_views
 from ..walk import Walk, check_inside
 
+SURROUNDINGS, BODY, RULES = Surroundings(), Body(), StoppingRules()  # whose defaults are those of a task
 ARRIVAL_REWARD = 1.0  # on top of the metres: a learner that passes the goal to the side has come as far
 
 Observations = np.ndarray  # (n, height, width, 3) uint8, or (n, h, w) float32
@@ -67,21 +69,21 @@ class RouteTask:
         max_steps: Limit of steps; None means as many as three times the route's length needs.
     """
 
-    world: Any = instance_of(str | os.PathLike | World, "tussock-field", "a preset's name, a file or a World")
+    world: Any = instance_of(str | os.PathLike | World, SURROUNDINGS.world, "a preset's name, a file or a World")
     world_seed: int = whole(0, low=0)
     worlds: int = whole(1)
     route: Any = instance_of(Route | str | os.PathLike | None, None, "a Route or its file")
-    length: float = number(8.0, above=0, unit="m")
+    length: float = number(SURROUNDINGS.route_length, low=0.1, unit="m")
     eye: Eye = instance_of(Eye, Eye(width=90, height=25), "an Eye")  # a pixel is 4 degrees wide and 3 high
     encoding: Any = instance_of(Encoding | str | None, None, "its name or its steps")
-    renderer: str = "auto"
+    renderer: str = SURROUNDINGS.renderer
     offset: float = number(0.1, low=0, unit="m")
-    heading_noise: float = number(0.0, low=0, unit="rad")
-    step_length: float = number(0.05, above=0, unit="m")
-    arrive: float = number(0.15, above=0, unit="m")
-    lost: float = number(0.5, above=0, unit="m")
-    patience: float = number(3.0, above=0, unit="m")
-    max_steps: int | None = whole(None, optional=True)
+    heading_noise: float = number(BODY.heading_noise, low=0, unit="rad")
+    step_length: float = number(BODY.step_length, above=0, unit="m")
+    arrive: float = number(RULES.arrival_radius, above=0, unit="m")
+    lost: float = number(RULES.max_deviation, above=0, unit="m")
+    patience: float = number(RULES.patience, above=0, unit="m")
+    max_steps: int | None = whole(RULES.max_steps, optional=True)
 
     def __attrs_post_init__(self):
         generated = isinstance(self.world, str) and is_generated(self.world) and self.route is None
@@ -267,11 +269,11 @@ class Episode:
 
 
 def as_numbers(name: str, given: Any, count: int, wanted: str) -> list[float]:
-    """What is given, as `count` numbers. Raises SettingError."""
+    """What is given, as `count` finite numbers. Raises SettingError."""
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise SettingError(f"{name}: {error}; give {wanted}") from error
-    if values.shape != (count,):
+    if values.shape != (count,) or not np.isfinite(values).all():
         raise SettingError(f"{name} {values.tolist()}; give {wanted}")
     return values.tolist()
