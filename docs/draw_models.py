@@ -93,4 +93,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [*MODELS, "opponent-infomax"])
+    main(sys.argv[1:] or [*MODELS.builtin, "opponent-infomax"])

@@ -103,7 +103,7 @@ class Experiment(Surroundings):
     device: str = attrs.field(default="cpu")
 
     def __attrs_post_init__(self):
-        from .models.base import check_device
+        from .models.checks import check_device
 
         super().__attrs_post_init__()
         check_device(self.device)

@@ -268,7 +268,7 @@ def test_models_lists_each_with_a_line_and_its_paper(capfd):
     code, printed, _ = tussock(capfd, "models", "--json")
     assert code == 0
     models = json.loads(printed)["models"]
-    assert [*MODELS, "opponent-..."] == list(models)
+    assert [*MODELS.builtin, "opponent-..."] == list(models)
     assert all(len(row["what"]) > 20 and row["paper"] for row in models.values())
     assert "Ardin" in tussock(capfd, "models")[1]
 

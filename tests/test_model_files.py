@@ -1,4 +1,4 @@
-"""Model files: what was saved comes back, and what is no model file is refused in one line that names it."""
+"""Trained models and their files: what was saved is read back, and anything else is refused in one line that names the file."""
 
 import json
 import os
@@ -14,42 +14,40 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.torch import save_file
 from scenes import views
+from small_models import small
 
-from tussock.navigation.encoding import Encoding
-from tussock.navigation.models import MODELS, make_model
-from tussock.navigation.models.base import Model
-from tussock.navigation.models.files import load_model, save_model
+from tussock.navigation.encoding import STEPS, Encoding
+from tussock.navigation.models import MODELS, files, make_model
+from tussock.navigation.models.base import Model, model
+from tussock.navigation.models.files import TrainedModel, load_model, save_model
+from tussock.navigation.models.infomax import Infomax
 from tussock.render.eye import Eye
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, InputError, SettingError
+from tussock.world.settings import number
 
-CHEAPER = {
-    "mlp": {"max_iter": 5},
-    "mlp-rotation": {"steps": 5},
-    "mlp-mixture": {"steps": 5, "stretches": 2},
-    "adaboost": {"pool": 50, "features": 5, "passes": 1},
-    "rbm": {"epochs": 2},
-    "autoencoder": {"epochs": 2},
-    "mushroom-body": {"cells": 100, "active": 0.05},
-}
-NAMES = [*MODELS, "opponent-perfect-memory", "opponent-autoencoder"]
+NAMES = [*MODELS.builtin, "opponent-perfect-memory", "opponent-autoencoder"]
 
 
 @cache
 def trained(name: str) -> Model:
-    return make_model(name, **CHEAPER.get(name, {})).fit(views(4))
+    return small(name).fit(views(4))
 
 
 @pytest.fixture
 def saved(tmp_path) -> Path:
-    """A file that holds infomax with all that can be beside it."""
+    """A file that holds infomax with its encoding, eye and poses."""
     path = tmp_path / "infomax.model"
     encoding, eye = Encoding.named("edges", resize=3), Eye(width=72, height=15, samples=2)
-    save_model(trained("infomax"), path, encoding=encoding, eye=eye, poses=np.arange(12.0).reshape(4, 3))
+    save(trained("infomax"), path, encoding=encoding, eye=eye, poses=np.arange(12.0).reshape(4, 3))
     return path
 
 
+def save(model: Model, path: Path, **known) -> None:
+    save_model(TrainedModel(model=model, **known), path)
+
+
 def rewrite(path: Path, change: Callable[[dict, dict], object]) -> None:
-    """Let `change(header, tensors)` at what a file holds; what it returns is written for the header."""
+    """Change what a file holds by `change(header, tensors)`, which returns the new header."""
     with safetensors.safe_open(path, framework="pt") as file:
         header = json.loads(file.metadata()["tussock"])
         tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118 (it is no dict)
@@ -58,7 +56,7 @@ def rewrite(path: Path, change: Callable[[dict, dict], object]) -> None:
 
 
 def refuses(path: Path, **options) -> str:
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(FileError) as refusal:
         load_model(path, **options)
     message = str(refusal.value)
     assert str(path) in message
@@ -66,7 +64,7 @@ def refuses(path: Path, **options) -> str:
     return message
 
 
-def test_what_was_saved_comes_back(saved):
+def test_a_trained_model_is_read_back_from_its_file(saved):
     loaded = load_model(saved)
     assert loaded.model.name == "infomax"
     assert loaded.model.shape == (5, 24)
@@ -76,25 +74,25 @@ def test_what_was_saved_comes_back(saved):
     assert loaded.poses.tolist() == np.arange(12.0).reshape(4, 3).tolist()
 
 
-def test_what_is_not_known_comes_back_as_none(tmp_path):
-    save_model(trained("rbm"), tmp_path / "rbm")
+def test_unknown_encoding_eye_and_poses_are_read_back_as_none(tmp_path):
+    save(trained("rbm"), tmp_path / "rbm")
     loaded = load_model(tmp_path / "rbm")
     assert loaded.encoding is loaded.eye is loaded.poses is None
 
 
-def test_parameters_come_back_with_their_types(tmp_path):
+def test_parameters_are_read_back_with_their_types(tmp_path):
     model = make_model("mlp", hidden_layer_sizes=(6, 5), negatives_deg=(90.0,), max_iter=3, seed=9).fit(views(4))
-    save_model(model, tmp_path / "mlp")
+    save(model, tmp_path / "mlp")
     loaded = load_model(tmp_path / "mlp").model
     assert loaded.parameters == model.parameters
     assert loaded.hidden_layer_sizes == (6, 5)
     assert (loaded.predict(views(3, 1)) == model.predict(views(3, 1))).all()
 
 
-def test_a_loaded_model_learns_on(tmp_path):
+def test_a_loaded_model_can_learn_further_views(tmp_path):
     for name in ("perfect-memory", "infomax", "mushroom-body"):
-        model = make_model(name, **CHEAPER.get(name, {})).fit(views(4))
-        save_model(model, tmp_path / name)
+        model = small(name).fit(views(4))
+        save(model, tmp_path / name)
         loaded = load_model(tmp_path / name).model.partial_fit(views(3, 1))
         assert torch.equal(loaded.scan(views(2, 2)), model.partial_fit(views(3, 1)).scan(views(2, 2)))
 
@@ -108,7 +106,7 @@ def test_a_loaded_model_needs_its_file_no_longer(saved):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_same_model_gives_the_same_bytes(name, tmp_path):
     for file in ("one", "other"):
-        save_model(trained(name), tmp_path / file, poses=np.zeros((4, 3)))
+        save(trained(name), tmp_path / file, poses=np.zeros((4, 3)))
     assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
 
 
@@ -121,11 +119,11 @@ def test_another_model_than_expected_is_refused_naming_both(saved):
 
 
 def test_a_device_that_is_not_there_is_refused(saved):
-    with pytest.raises(InputError, match="device 'nonsense'"):
+    with pytest.raises(SettingError, match="device 'nonsense'"):
         load_model(saved, device="nonsense")
 
 
-def test_what_is_no_file_is_refused(tmp_path):
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     refuses(tmp_path / "missing")
     refuses(tmp_path)
 
@@ -133,7 +131,7 @@ def test_what_is_no_file_is_refused(tmp_path):
 @pytest.mark.parametrize(
     "content", [b"", b"x", b"\x00" * 8, b"\xff" * 64, b"x_m,y_m\n1,2\n", b"\x02" + b"\x00" * 7 + b"{}"]
 )
-def test_what_is_no_model_file_is_refused(content, tmp_path):
+def test_a_file_of_something_else_is_refused(content, tmp_path):
     path = tmp_path / "model"
     path.write_bytes(content)
     refuses(path)
@@ -148,16 +146,16 @@ def test_a_file_cut_short_is_refused(saved):
 
 @settings(max_examples=150)
 @given(st.data())
-def test_a_byte_gone_wrong_is_refused_or_harmless(tmp_path_factory, data):
+def test_a_wrong_byte_is_refused_or_harmless(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("flip") / "model"
-    save_model(trained("rbm"), path, eye=Eye(), poses=np.zeros((4, 3)), encoding=Encoding.named("sky"))
+    save(trained("rbm"), path, eye=Eye(), poses=np.zeros((4, 3)), encoding=Encoding.named("sky"))
     content = bytearray(path.read_bytes())
     header = 8 + int.from_bytes(content[:8], "little")
     content[data.draw(st.integers(0, header + 40))] = data.draw(st.integers(0, 255))
     path.write_bytes(content)
     try:
         load_model(path)
-    except InputError as error:
+    except FileError as error:
         assert str(path) in str(error)  # noqa: PT017 (it need not be raised)
 
 
@@ -169,7 +167,7 @@ def test_a_safetensors_file_of_something_else_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "{", "nonsense", "[" * 100_000], ids=["empty", "half", "words", "deep"])
-def test_a_header_that_is_no_json_is_refused(text, tmp_path):
+def test_a_header_that_is_not_json_is_refused(text, tmp_path):
     save_file({"learned.weights": torch.zeros(3)}, tmp_path / "other", {"tussock": text})
     refuses(tmp_path / "other")
 
@@ -245,7 +243,7 @@ LEARNED = [(name, key) for name in NAMES for key in trained(name).learned]
 @pytest.mark.parametrize(("name", "key"), LEARNED)
 def test_a_tensor_that_is_missing_is_refused(name, key, tmp_path):
     path = tmp_path / "model"
-    save_model(trained(name), path)
+    save(trained(name), path)
     rewrite(path, lambda header, tensors: (tensors.pop(f"learned.{key}"), header)[1])
     refuses(path)
 
@@ -258,7 +256,7 @@ def change(path: Path, key: str, into: Callable[[torch.Tensor], torch.Tensor]) -
 def test_a_tensor_of_another_shape_is_refused(name, key, tmp_path):
     path = tmp_path / "model"
     for into in (lambda t: t[..., :-1].clone(), lambda t: torch.cat([t, t], dim=-1), lambda t: t[None].clone()):
-        save_model(trained(name), path)
+        save(trained(name), path)
         change(path, f"learned.{key}", into)
         refuses(path)
 
@@ -269,7 +267,7 @@ def test_a_tensor_of_another_shape_is_refused(name, key, tmp_path):
 )
 def test_a_number_that_is_not_finite_is_refused(name, key, bad, tmp_path):
     path = tmp_path / "model"
-    save_model(trained(name), path)
+    save(trained(name), path)
 
     def spoil(tensor: torch.Tensor) -> torch.Tensor:
         tensor.view(-1)[-1] = bad
@@ -280,52 +278,93 @@ def test_a_number_that_is_not_finite_is_refused(name, key, bad, tmp_path):
 
 
 @pytest.mark.parametrize("neuron", [-1, 10**6])
-def test_a_mushroom_body_wired_to_no_neuron_is_refused(neuron, tmp_path):
+def test_a_mushroom_body_wired_to_neurons_that_do_not_exist_is_refused(neuron, tmp_path):
     path = tmp_path / "model"
-    save_model(trained("mushroom-body"), path)
+    save(trained("mushroom-body"), path)
     change(path, "learned.wiring", lambda wiring: torch.full_like(wiring, neuron))
     refuses(path)
 
 
-@pytest.mark.parametrize(
-    "poses",
-    [torch.zeros(4, 2).double(), torch.zeros(12).double(), torch.zeros(4, 3, dtype=torch.int64), torch.full((4, 3), torch.nan).double()],
-    ids=["two columns", "flat", "integers", "NaN"],
-)  # fmt: skip
-def test_poses_that_are_none_are_refused(saved, poses):
-    change(saved, "poses", lambda _: poses)
-    refuses(saved)
+BAD_POSES = {
+    "two columns": np.zeros((4, 2)),
+    "flat": np.zeros(12),
+    "integers": np.zeros((4, 3), dtype=np.int64),
+    "NaN": np.full((4, 3), np.nan),
+}
+
+
+@pytest.mark.parametrize("poses", BAD_POSES.values(), ids=BAD_POSES)
+def test_invalid_poses_in_a_file_are_refused(saved, poses):
+    change(saved, "poses", lambda _: torch.tensor(poses))
+    assert "poses" in refuses(saved)
+
+
+@pytest.mark.parametrize("poses", [*BAD_POSES.values(), [(0.0, 0.0, 0.0)] * 4], ids=[*BAD_POSES, "list"])
+def test_invalid_poses_are_refused_when_a_trained_model_is_made(poses):
+    with pytest.raises(SettingError, match="poses"):
+        TrainedModel(model=trained("infomax"), poses=poses)
+
+
+@pytest.mark.parametrize("count", [3, 5])
+@pytest.mark.parametrize("name", ["perfect-memory", "chain"])
+def test_snapshots_need_as_many_poses(name, count, tmp_path):
+    with pytest.raises(SettingError, match=f"{count} poses for 4 snapshots"):
+        TrainedModel(model=trained(name), poses=np.zeros((count, 3)))
+    path = tmp_path / "model"
+    save(trained(name), path, poses=np.zeros((4, 3)))
+    change(path, "poses", lambda _: torch.zeros(count, 3, dtype=torch.float64))
+    assert f"{count} poses for 4 snapshots" in refuses(path)
+
+
+def test_the_index_of_a_compass_needs_a_pose():
+    assert len(TrainedModel(model=trained("visual-compass"), poses=np.zeros((4, 3))).poses) == 4
+    with pytest.raises(SettingError, match="3 poses"):
+        TrainedModel(model=trained("visual-compass"), poses=np.zeros((3, 3)))
+
+
+def test_a_model_that_learned_more_since_is_not_saved_with_its_old_poses(tmp_path):
+    learner = small("perfect-memory").fit(views(4))
+    record = TrainedModel(model=learner, poses=np.zeros((4, 3)))
+    learner.partial_fit(views(2, 1))
+    with pytest.raises(SettingError, match="4 poses for 6 snapshots"):
+        save_model(record, tmp_path / "model")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("field", ["model", "encoding", "eye"])
+def test_anything_but_a_model_an_encoding_and_an_eye_is_refused(field):
+    with pytest.raises(SettingError, match=field):
+        TrainedModel(**({"model": trained("infomax")} | {field: "edges"}))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_model_that_has_learned_nothing_is_not_saved(name, tmp_path):
-    with pytest.raises(InputError, match=r"model: .*learned nothing"):
-        save_model(make_model(name), tmp_path / "model")
-    assert list(tmp_path.iterdir()) == []
+def test_an_untrained_model_is_refused(name):
+    with pytest.raises(SettingError, match="learned nothing"):
+        TrainedModel(model=make_model(name))
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path):
     path = tmp_path / "nowhere" / "model"
     with pytest.raises(InputError, match="no folder") as refusal:
-        save_model(trained("infomax"), path)
+        save(trained("infomax"), path)
     assert str(path) in str(refusal.value)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_for_a_name_is_refused(tmp_path):
     with pytest.raises(InputError, match="is a folder"):
-        save_model(trained("infomax"), tmp_path)
+        save(trained("infomax"), tmp_path)
 
 
 def test_in_a_read_only_folder_nothing_is_left(saved, monkeypatch):
     before = saved.read_bytes()
-    monkeypatch.setattr(os, "access", lambda *_: False)  # who runs the tests may be allowed everything
+    monkeypatch.setattr(os, "access", lambda *_: False)  # the tests may run with all rights
     with pytest.raises(InputError, match="read-only"):
-        save_model(trained("rbm"), saved)
+        save(trained("rbm"), saved)
     assert [each.read_bytes() for each in saved.parent.iterdir()] == [before]
 
 
-def test_where_writing_fails_the_old_file_stays(saved, monkeypatch):
+def test_the_old_file_stays_if_writing_fails(saved, monkeypatch):
     before = saved.read_bytes()
 
     def full(path: Path, data: bytes) -> None:
@@ -335,5 +374,130 @@ def test_where_writing_fails_the_old_file_stays(saved, monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match="No space left"):
-        save_model(trained("rbm"), saved)
+        save(trained("rbm"), saved)
     assert [each.read_bytes() for each in saved.parent.iterdir()] == [before]
+
+
+# Former names
+
+
+def test_a_file_with_former_names_of_parameters_is_read(tmp_path):
+    path = tmp_path / "model"
+    save(trained("adaboost"), path)
+    rewrite(path, lambda header, tensors: header | {"parameters": renamed_back(header["parameters"])})
+    loaded = load_model(path).model
+    assert loaded.parameters == trained("adaboost").parameters
+    assert torch.equal(loaded.scan(views(3, 1)), trained("adaboost").scan(views(3, 1)))
+
+
+def renamed_back(parameters: dict) -> dict:
+    former = {"hard_negatives": "mined", "tolerance_deg": "apart_deg"}
+    assert former.keys() <= parameters.keys()
+    return {former.get(name, name): value for name, value in parameters.items()}
+
+
+# Models and steps from outside
+
+
+@model
+class Tuned(Infomax):
+    """A model from outside that derives from a built-in one."""
+
+    name = "tuned"
+    gain: float = number(1.0, low=0)
+
+    def _scan(self, views):
+        return self.gain * super()._scan(views)
+
+
+class Bare:
+    """A model from outside that does not derive from `Model`."""
+
+    def fit(self, views):
+        return self
+
+    def scan(self, views):
+        return views.mean(dim=1)
+
+
+class Halve:
+    """A step of encodings from outside."""
+
+    def __call__(self, images):
+        return images / 2
+
+
+@pytest.fixture
+def outside(monkeypatch):
+    """Registries that forget afterwards what a test enters."""
+    for registry in (MODELS, STEPS):
+        monkeypatch.setattr(registry, "_registered", {})
+
+
+@pytest.mark.parametrize("prefix", ["", "opponent-"])
+def test_a_file_with_a_model_from_outside_needs_its_class_and_imports_nothing(prefix, tmp_path, outside, monkeypatch):
+    path, name = tmp_path / "model", f"{prefix}{Tuned.__module__}:Tuned"
+    learner = make_model(name, gain=3).fit(views(4))
+    save(learner, path)
+    assert load_model(path).model.attractive.gain == 3 if prefix else load_model(path).model.gain == 3
+    assert torch.equal(load_model(path, expect=name).model.scan(views(2, 1)), learner.scan(views(2, 1)))
+
+    monkeypatch.setattr(MODELS, "_registered", {})
+    message = refuses(path)
+    assert f"{Tuned.__module__}:Tuned" in message
+    assert "--use" in message
+    assert "damaged" not in message
+    MODELS.find(f"{Tuned.__module__}:Tuned")  # as --use does
+    load_model(path)
+
+
+def test_a_file_names_a_registered_model_by_its_name(tmp_path, outside, monkeypatch):
+    MODELS.register("mine", Tuned)
+    save(make_model("mine gain=2").fit(views(4)), tmp_path / "model")
+    assert load_model(tmp_path / "model", expect="mine").model.gain == 2
+    monkeypatch.setattr(MODELS, "_registered", {})
+    assert "'mine'" in refuses(tmp_path / "model")
+
+
+def test_a_file_with_an_encoding_step_from_outside_needs_its_class(tmp_path, outside, monkeypatch):
+    path, step = tmp_path / "model", f"{Halve.__module__}:Halve"
+    encoding = Encoding.parse(f"grey | {step}")
+    save(trained("infomax"), path, encoding=encoding)
+    assert str(load_model(path).encoding) == str(encoding)
+    monkeypatch.setattr(STEPS, "_registered", {})
+    message = refuses(path)
+    assert step in message
+    assert "--use" in message
+    assert "damaged" not in message
+
+
+def test_a_model_that_does_not_derive_from_model_is_trained_but_not_saved(tmp_path):
+    record = TrainedModel(model=Bare(), poses=np.zeros((2, 3)))
+    with pytest.raises(SettingError, match="derive"):
+        save_model(record, tmp_path / "model")
+    assert list(tmp_path.iterdir()) == []
+
+
+# Too little memory
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        torch.cuda.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB"),
+        MemoryError("Unable to allocate 2.00 GiB"),
+        RuntimeError("[enforce fail at alloc_cpu.cpp:127] . DefaultCPUAllocator: can't allocate memory"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+@pytest.mark.parametrize("where", ["_read", "_trained"])
+def test_too_little_memory_is_not_called_damage(saved, error, where, monkeypatch):
+    def full(*_):
+        raise error
+
+    monkeypatch.setattr(files, where, full)
+    with pytest.raises(SettingError, match="too little memory") as refusal:
+        load_model(saved)
+    assert str(saved) in str(refusal.value)
+    assert "'cpu'" in str(refusal.value)
+    assert "damaged" not in str(refusal.value)

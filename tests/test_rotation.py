@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tussock.navigation.models import filter_bank
-from tussock.navigation.models.filter_bank import FilterBank
+from tussock.navigation.models.filter_bank import FilterBank, NearestFilters
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.world.errors import InputError
 from tussock.world.geometry import turn_of_columns, wrap_angle
@@ -15,42 +15,64 @@ from tussock.world.geometry import turn_of_columns, wrap_angle
 sizes = st.tuples(st.integers(1, 4), st.integers(1, 5), st.integers(1, 6), st.integers(4, 15))
 
 
+def random_images(n: int, h: int, w: int, seed: int) -> torch.Tensor:
+    return torch.randn(n, h, w, generator=torch.Generator().manual_seed(seed))
+
+
+def rolled(views: torch.Tensor) -> torch.Tensor:
+    """Every view at every rotation (n, w, h, w), in float64."""
+    return torch.stack([torch.roll(views.double(), k, dims=-1) for k in range(views.shape[-1])], dim=1)
+
+
+def by_rolling(views: torch.Tensor, filters: torch.Tensor, biases: torch.Tensor) -> torch.Tensor:
+    """Responses (n, w, m) from rolled views, in float64."""
+    return torch.einsum("nkhw,mhw->nkm", rolled(views), filters.double()) + biases.double()
+
+
 @given(sizes, st.integers(0, 1000))
 def test_responses_equal_rolling_and_summing(size, seed):
     n, m, h, w = size
-    random = torch.Generator().manual_seed(seed)
-    views, filters = torch.randn(n, h, w, generator=random), torch.randn(m, h, w, generator=random)
-    rolled = torch.stack([torch.roll(views, k, dims=-1) for k in range(w)], dim=-1)  # (n, h, w, k)
-    biases = torch.randn(m, generator=random)
-    expected = torch.einsum("nhwk,mhw->nkm", rolled, filters)
-    assert torch.allclose(FilterBank(filters).responses(views), expected, atol=1e-4)
-    assert torch.allclose(FilterBank(filters, biases).responses(views), expected + biases, atol=1e-4)
+    views, filters, biases = random_images(n, h, w, seed), random_images(m, h, w, seed + 1), torch.arange(float(m))
+    expected = by_rolling(views, filters, biases)
+    assert torch.allclose(FilterBank(filters).responses(views).double(), expected - biases, atol=1e-4)
+    assert torch.allclose(FilterBank(filters, biases).responses(views).double(), expected, atol=1e-4)
 
 
-def test_blocks_change_nothing(monkeypatch):
-    views, filters = torch.randn(3, 4, 12), torch.randn(50, 4, 12)
-    whole = FilterBank(filters).responses(views)
-    monkeypatch.setattr(filter_bank, "BLOCK", 16)
-    bank = FilterBank(filters)
-    assert len(list(bank.chunks(views))) == 4
-    assert torch.allclose(bank.responses(views), whole, atol=1e-5)
+@given(sizes, st.integers(0, 1000), st.data())
+def test_the_nearest_filter_is_the_one_with_the_least_response(size, seed, data):
+    n, m, h, w = size
+    first = data.draw(st.integers(0, m - 1))
+    among = slice(first, data.draw(st.integers(first + 1, m)))
+    views, filters, biases = random_images(n, h, w, seed), random_images(m, h, w, seed + 1), torch.arange(float(m))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(filter_bank, "FILTERS", data.draw(st.integers(1, m)))
+        patch.setattr(filter_bank, "VIEWS", data.draw(st.integers(1, n)))
+        least, index = NearestFilters(filters, biases).nearest(views, among)
+    expected = by_rolling(views, filters, biases)
+    assert torch.allclose(least.double(), expected[..., among].amin(dim=2), atol=1e-4)
+    assert ((index >= among.start) & (index < among.stop)).all()
+    assert torch.allclose(least.double(), expected.gather(2, index[..., None])[..., 0], atol=1e-4)
 
 
-@pytest.mark.parametrize("width", [8, 16, 36, 64, 90, 121])
-@pytest.mark.parametrize("m", [1, 7, 40, 127, 600])
-@pytest.mark.parametrize("n", [1, 5, 32])
-def test_responses_do_not_depend_on_the_number_of_threads(width, m, n):
-    random = torch.Generator().manual_seed(m + n)
-    views, filters = torch.randn(n, 5, width, generator=random), torch.randn(m, 5, width, generator=random)
+@pytest.mark.parametrize(("n", "m", "width"), [(1, 600, 8), (32, 40, 36), (32, 1, 64), (1, 40, 121), (32, 600, 90)])
+def test_threads_and_batches_change_responses_by_no_more_than_the_stated_rounding(n, m, width):
+    views, filters = random_images(n, 5, width, m + n), random_images(m, 5, width, m + n + 1)
+    sizes = views.flatten(start_dim=1).norm(dim=1)[:, None, None] * filters.flatten(start_dim=1).norm(dim=1)
+    tolerance = 1e-6 * width**0.5 * sizes
+    expected = by_rolling(views, filters, torch.zeros(m))
     threads = torch.get_num_threads()
     try:
-        responses = []
-        for number in (1, 2, 3, 8):
+        for number in (1, 2, 5):
             torch.set_num_threads(number)
-            responses.append(FilterBank(filters).responses(views).contiguous().numpy().tobytes())
+            bank, nearest = FilterBank(filters), NearestFilters(filters, torch.zeros(m))
+            together, least = bank.responses(views), nearest.nearest(views)[0]
+            assert torch.equal(bank.responses(views), together)  # the same threads and batch: the same bytes
+            assert torch.equal(nearest.nearest(views)[0], least)
+            for responses in (together, torch.cat([bank.responses(view[None]) for view in views])):
+                assert ((responses - expected).abs() <= tolerance).all()
+            assert ((least - expected.amin(dim=2)).abs() <= tolerance.amax(dim=2)).all()
     finally:
         torch.set_num_threads(threads)
-    assert len(set(responses)) == 1
 
 
 def test_the_best_turn_is_left_for_low_rotations_and_right_for_high_ones():
@@ -95,12 +117,9 @@ def test_a_scan_of_no_angle_is_refused(angle):
         scan_window(36, angle)
 
 
-def test_responses_can_be_learned_from():
-    """Their gradient is that of the loop that rolls the view."""
-    views = torch.randn(2, 3, 8)
-    filters, biases = torch.randn(4, 3, 8, requires_grad=True), torch.randn(4, requires_grad=True)
-    rolled = torch.stack([torch.roll(views, k, dims=-1) for k in range(8)], dim=-1)
-    slow = torch.einsum("nhwk,mhw->nkm", rolled, filters) + biases
-    expected = torch.autograd.grad(slow.square().sum(), (filters, biases))
-    found = torch.autograd.grad(FilterBank(filters, biases).responses(views).square().sum(), (filters, biases))
-    assert all(torch.allclose(a, b, rtol=1e-4, atol=1e-3) for a, b in zip(found, expected, strict=True))
+def test_gradients_of_responses_equal_those_of_rolling():
+    views, filters, biases = random_images(2, 3, 8, 0), random_images(4, 3, 8, 1), random_images(1, 1, 4, 2)[0, 0]
+    filters.requires_grad_(), biases.requires_grad_()
+    expected = torch.autograd.grad(by_rolling(views, filters, biases).square().sum(), (filters, biases))
+    gradients = torch.autograd.grad(FilterBank(filters, biases).responses(views).square().sum(), (filters, biases))
+    assert all(torch.allclose(a, b, rtol=1e-4, atol=1e-3) for a, b in zip(gradients, expected, strict=True))

@@ -55,7 +55,7 @@ class BenchmarkCommand:
         from ..models import MODELS
 
         benchmark = QUICK if self.quick else BENCHMARK
-        names = list(MODELS) if self.model == "all" else split_list(self.model or "")
+        names = list(MODELS.builtin) if self.model == "all" else split_list(self.model or "")
         files = []
         for name in dict.fromkeys(map(checked_entry, names)):  # refuses what is none before the work begins
             message(f"{name}: {len(benchmark)} runs of {benchmark.name}")

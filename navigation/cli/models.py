@@ -153,7 +153,7 @@ class CompareCommand(LearningOptions):
         from ..models import MODELS, model_spec
 
         experiment = self.experiment()
-        names = list(MODELS) if self.models == "all" else split_list(self.models)
+        names = list(MODELS.builtin) if self.models == "all" else split_list(self.models)
         specs = {name: model_spec(name) for name in dict.fromkeys(names)}
         for spec in specs.values():
             experiment.replace(model=spec)  # refuses bad parameters before the work begins
@@ -185,10 +185,10 @@ class ModelsCommand:
     """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        from ..models import MODELS, OPPONENT, model_class
+        from ..models import MODELS, OPPONENT
         from ..models.opponents import Opponent
 
-        classes = {name: model_class(name) for name in MODELS} | {f"{OPPONENT}...": Opponent}
+        classes = {name: MODELS.find(name) for name in MODELS.names} | {f"{OPPONENT}...": Opponent}
         return {
             "models": {
                 name: {"what": summary(cls), "paper": getattr(cls, "paper", "")} for name, cls in classes.items()

@@ -1,7 +1,6 @@
 """AdaBoost over Haar-like filters: the few of many random features that tell the route from turned views."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numba
@@ -11,48 +10,56 @@ from jaxtyping import Float32, Float64, UInt8
 
 from tussock.render.compile import compiled
 from tussock.world.geometry import columns_of_turn
+from tussock.world.settings import number, numbers, whole
 
-from .base import Images, Learned, Model, Scans
-from .filter_bank import FilterBank, in_parts
+from .base import Images, Learned, Model, Scans, Shapes, model
+from .filter_bank import FilterBank
+from .rotations import in_batches
 
-NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a threshold unit is sought
-THRESHOLDS = 63  # tried for a filter: quantiles of its responses
-SHAPES = (((1, -1),), ((1,), (-1,)), ((1, -2, 1),), ((1,), (-2,), (1,)), ((1, -1), (-1, 1)))  # of Haar-like filters
+NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a stump is searched
+THRESHOLDS = 63  # that are tried for a filter: quantiles of its responses
+# Signs of the boxes of Haar-like filters.
+SHAPES = (((1, -1),), ((1,), (-1,)), ((1, -2, 1),), ((1,), (-2,), (1,)), ((1, -1), (-1, 1)))
 
 
-@dataclass(kw_only=True, eq=False)
+@model
 class AdaBoost(Model):
-    """Threshold units on Haar-like filters, boosted to tell views along the route from turned copies of them.
+    """Threshold units (stumps) on Haar-like filters, boosted to tell views along the route from turned copies of them.
 
-    Each round takes the filter and threshold with the least weighted error e, gives it the vote log((1 - e) / e) / 2, and weighs up what
-    it got wrong. Familiarity is the sum of votes. Section 3.3.1 of the thesis. Constant memory.
+    Each round takes the filter and threshold with the least weighted error e, gives it the vote log((1 - e) / e) / 2, and gives more
+    weight to the samples that it got wrong. Familiarity is the sum of votes. Section 3.3.1 of the thesis. Constant memory.
 
-    The first negatives are each view turned by `negatives_deg`. They leave most of the circle unseen, so, as in face detection, it
-    looks around each view with what it has, adds the `mined` most familiar wrong rotations of each to the negatives, and boosts
-    again: `passes` times in all. One pass is the study's recipe.
+    The first negatives are each view turned by `negatives_deg`. They cover little of the circle, so, as in face detection, the model
+    scans its views with what it has learned, adds the most familiar wrong rotations of each to the negatives, and boosts again.
 
-    pool: random filters to choose from. features: how many are chosen. apart_deg: rotations nearer than this are not wrong.
+    Attributes:
+        pool: Number of random filters to choose from.
+        features: Number of filters that are chosen.
+        negatives_deg: How far the views are turned to the left for the first negatives (deg).
+        passes: How often it boosts; 1 is the study's recipe.
+        hard_negatives: Wrong rotations of each view that are added to the negatives after each pass.
+        tolerance_deg: Rotations nearer than this to the right one are not wrong (deg).
     """
 
     name = "adaboost"
     paper = "Freund and Schapire 1997; Viola and Jones 2001; Philippides et al. 2015"
+    renamed = {"mined": "hard_negatives", "apart_deg": "tolerance_deg"}  # noqa: RUF012
 
-    LIMITS = {"apart_deg": (0.0, 90.0)}  # noqa: RUF012
-    pool: int = 5000
-    features: int = 200
-    negatives_deg: tuple[float, ...] = (45.0, -45.0)
-    passes: int = 3
-    mined: int = 2
-    apart_deg: float = 12.0
+    pool: int = whole(5000)
+    features: int = whole(200)
+    negatives_deg: tuple[float, ...] = numbers((45.0, -45.0), unit="deg")
+    passes: int = whole(3)
+    hard_negatives: int = whole(2)
+    tolerance_deg: float = number(12.0, low=0, high=90, unit="deg")
 
     def _learn(self, views: Images) -> Learned:
         width = views.shape[2]
-        pool = self._here(haar_filters(self.pool, views.shape[1], width, np.random.default_rng(self.seed)))
+        pool = self._on_device(haar_filters(self.pool, views.shape[1], width, np.random.default_rng(self.seed)))
         turns = [round(columns_of_turn(degrees, width, full_turn=360)) for degrees in self.negatives_deg]
         negatives = torch.cat([torch.roll(views, turn, dims=-1) for turn in turns])
         learned = self._boost(pool, views, negatives)
         for _ in range(self.passes - 1):
-            negatives = torch.cat([negatives, self._mistaken(views, learned)])
+            negatives = torch.cat([negatives, self._hard_negatives(views, learned)])
             learned = self._boost(pool, views, negatives)
         return learned
 
@@ -64,57 +71,60 @@ class AdaBoost(Model):
         labels = np.repeat([1.0, -1.0], [len(positives), len(negatives)])
         responses = (pool.flatten(start_dim=1) @ samples.T).cpu().numpy()  # (pool, samples)
         thresholds = np.stack([thresholds_between(row) for row in responses])
-        bins = np.stack([
-            np.searchsorted(*pair).astype(np.uint8) for pair in zip(thresholds, responses, strict=True)
-        ])  # fmt: skip
+        rows = zip(thresholds, responses, strict=True)
+        bins = np.stack([np.searchsorted(*row).astype(np.uint8) for row in rows])
         weights = np.where(labels > 0, 0.5 / len(positives), 0.5 / len(negatives))
-        chosen, cuts, cast = [], [], []
+        chosen, cuts, votes = [], [], []
         for _ in range(self.features):
             stump = best_stump(bins, weights * labels)
             error = np.clip(stump.error, 1e-6, 1 - 1e-6)
             vote = 0.5 * np.log((1 - error) / error)
-            says = np.where(bins[stump.filter] > stump.bin, 1.0, -1.0) * stump.sign
-            weights *= np.exp(-vote * labels * says)
+            answers = np.where(bins[stump.filter] > stump.bin, 1.0, -1.0) * stump.sign
+            weights *= np.exp(-vote * labels * answers)
             weights /= weights.sum()
             chosen.append(stump.filter)
             cuts.append(thresholds[stump.filter, stump.bin])
-            cast.append(vote * stump.sign)
+            votes.append(vote * stump.sign)
         return {
             "filters": pool[chosen],
-            "cuts": self._here(torch.tensor(np.array(cuts))),
-            "votes": self._here(torch.tensor(cast, dtype=torch.float32)),
+            "cuts": self._on_device(torch.tensor(np.array(cuts))),
+            "votes": self._on_device(torch.tensor(votes, dtype=torch.float32)),
         }
 
-    def _mistaken(self, views: Images, learned: Learned) -> Float32[torch.Tensor, "m h w"]:
-        """The rotations of each view that look most familiar and are wrong."""
+    def _hard_negatives(self, views: Images, learned: Learned) -> Float32[torch.Tensor, "m h w"]:
+        """The most familiar of the wrong rotations of each view."""
         width = views.shape[2]
         away = torch.arange(width, device=views.device)
-        wrong = torch.minimum(away, width - away) * (360 / width) >= self.apart_deg
+        wrong = torch.minimum(away, width - away) * (360 / width) >= self.tolerance_deg
         bank = FilterBank(learned["filters"])
-        scan = torch.cat([votes(bank, learned, part) for part in in_parts(views)]).where(wrong, -torch.inf)
-        turns = scan.topk(min(self.mined, int(wrong.sum())), dim=1).indices.tolist()
+        scan = torch.cat([sum_of_votes(bank, learned, batch) for batch in in_batches(views)]).where(wrong, -torch.inf)
+        turns = scan.topk(min(self.hard_negatives, int(wrong.sum())), dim=1).indices.tolist()
         return torch.stack([view.roll(k, dims=-1) for view, ks in zip(views, turns, strict=True) for k in ks])
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+    def _shapes(self, height: int, width: int) -> Shapes:
         return {"filters": (self.features, height, width), "cuts": (self.features,), "votes": (self.features,)}
 
     def _prepare(self) -> None:
         self._bank = FilterBank(self.learned["filters"])
 
     def _scan(self, views: Images) -> Scans:
-        return votes(self._bank, self.learned, views)
+        return sum_of_votes(self._bank, self.learned, views)
 
 
-def votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:
-    """Sum of the votes of all threshold units at each rotation."""
-    says = (bank.responses(views) > learned["cuts"]).float() * 2 - 1
-    return says @ learned["votes"]
+def sum_of_votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:
+    """Sum of the votes of all stumps at each rotation."""
+    answers = (bank.responses(views) > learned["cuts"]).float() * 2 - 1
+    return answers @ learned["votes"]
 
 
 class Stump(NamedTuple):
-    """A threshold unit: it says `sign` where the filter's response lies above the bin, else -`sign`.
+    """A threshold unit.
 
-    error: weighted share of the samples that it gets wrong.
+    Attributes:
+        filter: Index of its filter.
+        bin: Index of its threshold.
+        sign: Its answer where the response of the filter is above the threshold; the opposite below.
+        error: Weighted share of the samples that it gets wrong.
     """
 
     filter: int
@@ -124,9 +134,9 @@ class Stump(NamedTuple):
 
 
 def thresholds_between(responses: Float32[np.ndarray, " samples"]) -> Float32[np.ndarray, " thresholds"]:
-    """Quantiles, each moved midway to the next larger response.
+    """Quantiles of a filter's responses, each moved midway to the next larger response.
 
-    Views have flat patches, of which a filter makes 0 but for rounding: a threshold on a response would leave the answer to chance.
+    Views have flat patches, whose response is 0 but for rounding: a threshold equal to a response would leave the answer to chance.
     """
     ordered = np.sort(responses)
     gap = 1e-5 * float(np.abs(ordered).max())
@@ -136,21 +146,21 @@ def thresholds_between(responses: Float32[np.ndarray, " samples"]) -> Float32[np
 
 
 def best_stump(bins: UInt8[np.ndarray, "pool samples"], signed: Float64[np.ndarray, " samples"]) -> Stump:
-    """The threshold unit with the least weighted error. signed: weights (summing to 1) times labels (1 and -1).
+    """The stump with the least weighted error.
 
-    While it looks, it leaves out the lightest samples, which together weigh NEGLIGIBLE; the error it tells is that on all.
+    The search leaves out the lightest samples, which together weigh NEGLIGIBLE; the error is that on all.
+
+    Args:
+        bins: (pool, samples) Bin of each filter's response to each sample.
+        signed: (samples,) Weights (of sum 1) times labels (1 and -1).
     """
     weights = np.abs(signed)
     order = weights.argsort()
     heavy = np.sort(order[np.searchsorted(weights[order].cumsum(), NEGLIGIBLE) :])
-    parts = np.array_split(np.arange(len(bins)), numba.get_num_threads())
+    parts = [part for part in np.array_split(np.arange(len(bins)), numba.get_num_threads()) if len(part)]
     with ThreadPoolExecutor(len(parts)) as threads:
-        found = list(
-            threads.map(
-                lambda part: _edges(bins[part[0] : part[-1] + 1], heavy, signed[heavy]), [p for p in parts if len(p)]
-            )
-        )
-    edges, cuts = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
+        results = threads.map(lambda part: _edges(bins[part[0] : part[-1] + 1], heavy, signed[heavy]), parts)
+    edges, cuts = (np.concatenate(arrays) for arrays in zip(*results, strict=True))
     best = int(np.abs(edges).argmax())
     sign = float(np.sign(edges[best]) or 1.0)
     edge = (signed * np.where(bins[best] > cuts[best], sign, -sign)).sum()
@@ -179,15 +189,15 @@ def _edges(bins, heavy, signed):
 def haar_filters(
     count: int, height: int, width: int, random: np.random.Generator
 ) -> Float32[torch.Tensor, "count h w"]:
-    """Haar-like filters of random shape, size and place: two, three or four boxes against each other, sum 0 and norm 1."""
+    """Haar-like filters of random shape, size and position: two, three or four boxes against each other, of sum 0 and norm 1."""
     shapes = [np.array(shape, dtype=np.float32) for shape in SHAPES]
     fitting = [shape for shape in shapes if len(shape) <= height]
     filters = np.zeros((count, height, width), dtype=np.float32)
     for filter in filters:
         shape = fitting[random.integers(len(fitting))]
-        tall = random.integers(1, height // shape.shape[0] + 1)
-        wide = random.integers(1, max(1, width // 3 // shape.shape[1]) + 1)
-        block = shape.repeat(tall, axis=0).repeat(wide, axis=1)
+        box_height = random.integers(1, height // shape.shape[0] + 1)
+        box_width = random.integers(1, max(1, width // 3 // shape.shape[1]) + 1)
+        block = shape.repeat(box_height, axis=0).repeat(box_width, axis=1)
         row, column = random.integers(height - len(block) + 1), random.integers(width)
         filter[row : row + len(block), : block.shape[1]] = block
         filter[:] = np.roll(filter, column, axis=1)

@@ -1,55 +1,62 @@
 """Snapshot chaining: from one snapshot to the next, in the order of the route."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from jaxtyping import Bool, Float32, Int64
 
-from .base import check_scan
+from tussock.world.settings import number
+
+from .base import model
+from .checks import check_scan
 from .filter_bank import FilterBank
 from .perfect_memory import PerfectMemory, energies
 
-SAMPLE = 32  # snapshots between which the usual difference of unrelated places is measured
+SAMPLE = 32  # snapshots between which the difference of unrelated positions is measured
 
 
-@dataclass(kw_only=True, eq=False)
+@model
 class Chain(PerfectMemory):
-    """Perfect memory that knows where it is: a walk compares only snapshots near the active one, and steps forward along them.
+    """Perfect memory with progress: a walk compares only snapshots near the active one, and moves forward along them.
 
-    Section 3.2 of the thesis. `follow` begins a walk; `scan`, which knows of no walk, compares all snapshots.
-    Memory grows with the number of views.
+    Section 3.2 of the thesis. `follow` begins a walk; `scan` knows of no walk and compares all snapshots. Memory grows with the
+    number of views.
 
-    window: share of the sequence ahead of the active snapshot that is searched, and half as much behind. strange: a best match
-    whose RMS difference exceeds this share of that between unrelated places is none, and the window doubles.
+    Attributes:
+        window: Share of the sequence ahead of the active snapshot that is compared, and half as much behind.
+        max_mismatch: Largest RMS difference of a match, as a share of the median between unrelated positions. Beyond it the match
+            is rejected, and the window doubles.
     """
 
     name = "chain"
     paper = "Cartwright and Collett 1983; the thesis, section 3.2"
+    renamed = {"strange": "max_mismatch"}  # noqa: RUF012
 
-    LIMITS = {"window": (0.001, 1.0)}  # noqa: RUF012
-    window: float = 0.05
-    strange: float = 0.85
+    window: float = number(0.05, low=0.001, high=1)
+    max_mismatch: float = number(0.85, low=0)
 
     def follow(self) -> "ChainWalk":
-        """Begin a walk along the chain, not knowing yet where."""
+        """Begin a walk along the chain, with unknown progress."""
         return ChainWalk(self)
 
     def _prepare(self) -> None:
         super()._prepare()
         pick = torch.linspace(0, len(self.snapshots) - 1, min(SAMPLE, len(self.snapshots))).round().long()
         sample = self.snapshots[pick] - self._level
-        squares = self._here(torch.from_numpy(energies(sample)))
+        squares = energies(sample)
         correlation = FilterBank(sample).responses(sample).amax(dim=1)
-        squared = (squares[:, None] + squares - 2 * correlation)[
-            torch.triu_indices(len(sample), len(sample), 1).unbind()
-        ]
+        pairs = torch.triu_indices(len(sample), len(sample), 1).unbind()
+        squared = (squares[:, None] + squares - 2 * correlation)[pairs]
         rms = (squared.clamp(min=0) / sample[0].numel()).sqrt()
-        self.strange_from = self.strange * float(rms.median()) if len(rms) else np.inf  # RMS difference
+        self.max_difference = self.max_mismatch * float(rms.median()) if len(rms) else np.inf  # RMS
 
 
 class ChainWalk:
-    """Where one walk along a chain has come to. active: index of the snapshot it is at, None while it is lost."""
+    """One walk along a chain.
+
+    Attributes:
+        chain: The trained chain.
+        active: Index of the snapshot that the walk is at; None while that is unknown.
+    """
 
     def __init__(self, chain: Chain):
         self.chain = chain
@@ -57,26 +64,34 @@ class ChainWalk:
 
     @property
     def progress(self) -> float | None:
-        """Share of the sequence, 0 to 1, that it believes to have walked; None while it is lost."""
+        """Share of the sequence, 0 to 1, that it believes to have walked; None while that is unknown."""
         return None if self.active is None else self.active / max(1, len(self.chain.snapshots) - 1)
 
     def look(
         self, view: Float32[torch.Tensor, "h w"], allowed: Bool[np.ndarray, " w"]
     ) -> tuple[Float32[torch.Tensor, " w"], Int64[torch.Tensor, " w"]]:
-        """Familiarity of each rotation and the snapshot each resembles most; the best `allowed` one becomes the active snapshot.
+        """Compare a view with the snapshots near the active one; the best match becomes the active one.
 
-        The window doubles until the match is no longer strange. Where nothing in the whole sequence matches, it is lost and
-        will look everywhere again.
+        The window doubles until the match is good enough. If nothing in the whole sequence matches, the progress is unknown, and the
+        next look compares all snapshots.
+
+        Args:
+            view: (h, w)
+            allowed: (w,) Rotations whose best match may become the active snapshot.
+
+        Returns:
+            Familiarity (w,) of each rotation, and the index (w,) of the snapshot that each resembles most.
         """
         chain = self.chain
         check_scan(view[None], chain.shape)
+        view, allowed_ = chain._on_device(view), chain._on_device(torch.as_tensor(allowed))
         reach = 1.0 if self.active is None else chain.window
         while True:
-            (familiarity,), (index,) = chain._nearest(chain._here(view[None]), self._within(reach))
-            best = int(torch.where(chain._here(torch.as_tensor(allowed)), familiarity, -torch.inf).argmax())
-            strange = -float(familiarity[best]) > chain.strange_from
-            if not strange or reach >= 1:
-                self.active = None if strange else int(index[best])
+            (familiarity,), (index,) = chain._nearest(view[None], self._within(reach))
+            best = int(torch.where(allowed_, familiarity, -torch.inf).argmax())
+            matches = -float(familiarity[best]) <= chain.max_difference
+            if matches or reach >= 1:
+                self.active = int(index[best]) if matches else None
                 return familiarity, index
             reach *= 2
 
@@ -85,6 +100,5 @@ class ChainWalk:
         count = len(self.chain.snapshots)
         if self.active is None or reach >= 1:
             return slice(0, count)
-        return slice(
-            max(0, self.active - round(reach * count / 2)), min(count, self.active + max(1, round(reach * count)) + 1)
-        )
+        behind, ahead = round(reach * count / 2), max(1, round(reach * count))
+        return slice(max(0, self.active - behind), min(count, self.active + ahead + 1))

@@ -1,9 +1,9 @@
-"""Trained models on disk: safetensors, with a JSON header that says what they are. Nothing in such a file is ever run."""
+"""Trained models, and their files: safetensors with a JSON header that describes them. Nothing in such a file is ever run."""
 
 import json
 import os
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -14,108 +14,175 @@ from safetensors.torch import save
 
 from tussock.render.eye import Eye
 from tussock.world.atomic import replacing
-from tussock.world.errors import InputError
+from tussock.world.errors import FileError, SettingError
+from tussock.world.settings import instance_of, settings
+from tussock.world.specs import Spec, split_words
 
-from ..encoding import Encoding
-from . import make_model
-from .base import FamiliarityModel, Model, check_device
+from ..encoding import OLD_NAMES, STEPS, Encoding
+from .base import FamiliarityModel, Model
+from .checks import check_device, first_line
+from .opponents import OPPONENT
+from .registry import MODELS
+from .specs import find_model, present_names
 
 HEADER, VERSION = "tussock", 1
 
 
-@dataclass(frozen=True, kw_only=True)
+@settings
 class TrainedModel:
-    """What a model file holds: the model, and the encoding, eye and poses (n, 3) of the views it learned, where they are known."""
+    """A trained model and what it learned from, so that it is not shown other views, and a match is looked up among the right poses.
 
-    model: FamiliarityModel
-    encoding: Encoding | None
-    eye: Eye | None
-    poses: Float[np.ndarray, "n 3"] | None
-
-
-def save_model(
-    model: Model, path: str | os.PathLike, *, encoding: Encoding | None = None, eye: Eye | None = None,
-    poses: Float[np.ndarray, "n 3"] | None = None,
-) -> None:  # fmt: skip
-    """Write a trained model; the same model gives the same bytes.
-
-    encoding, eye: of the views it learned, so that it is not given others. poses: where these were taken.
+    Attributes:
+        model: The model.
+        encoding: Of the views; None where it is not known.
+        eye: That saw the views; None where it is not known.
+        poses: (n, 3) Of the views, x and y (m) and heading (rad); None where they are not known.
     """
-    if model.shape is None:
-        raise InputError(f"{path}: this model has learned nothing yet; fit it before it is saved")
-    model.check_learned(model.shape, model.learned)
-    if poses is not None:
-        check_poses(path, model, poses)
-    device_free = {key: value for key, value in model.parameters.items() if key != "device"}
+
+    model: FamiliarityModel = instance_of(FamiliarityModel, attrs.NOTHING, "a model with fit(views) and scan(views)")
+    encoding: Encoding | None = instance_of(Encoding | None, None, "an Encoding or None")
+    eye: Eye | None = instance_of(Eye | None, None, "an Eye or None")
+    poses: Float[np.ndarray, "n 3"] | None = attrs.field(default=None, eq=attrs.cmp_using(eq=np.array_equal))
+
+    def __attrs_post_init__(self):
+        self.check()
+
+    def check(self) -> None:
+        """Refuse an untrained model, and poses that cannot be those of the views that it learned. Raises SettingError."""
+        if isinstance(self.model, Model) and self.model.shape is None:
+            raise SettingError(f"{self.model.name} has learned nothing yet; call fit(views) first")
+        poses: Any = self.poses
+        if poses is None:
+            return
+        array = isinstance(poses, np.ndarray) and poses.dtype.kind == "f" and poses.ndim == 2 and poses.shape[1] == 3
+        if not (array and np.isfinite(poses).all()):
+            raise SettingError("poses are not (n, 3) finite numbers; give x and y (m) and heading (rad) of each view")
+        learned = getattr(self.model, "learned", {})
+        snapshots, index = learned.get("snapshots"), learned.get("index")  # which matches are looked up by
+        if snapshots is not None and len(poses) != len(snapshots):
+            raise SettingError(f"{len(poses)} poses for {len(snapshots)} snapshots; give the pose of each, or none")
+        if index is not None and len(poses) <= int(index):
+            raise SettingError(
+                f"{len(poses)} poses, and it knows view {int(index)}; give the pose of each view, or none"
+            )
+
+
+def save_model(trained: TrainedModel, path: str | os.PathLike) -> None:
+    """Write a trained model. The same model gives the same bytes.
+
+    Raises:
+        SettingError: For a class that does not derive from `Model`, and where a model has learned more since `trained` was made.
+        FileError: Where the file cannot be written.
+    """
+    model, encoding, eye = trained.model, trained.encoding, trained.eye
+    if not isinstance(model, Model):
+        raise SettingError(
+            f"{path}: a {type(model).__name__} cannot be saved; derive it from tussock.navigation.models.base.Model"
+        )
+    trained.check()
+    model.check_learned(model.shape, model.learned)  # type: ignore[arg-type]
     header = {
-        "version": VERSION, "model": model.name, "parameters": device_free, "shape": model.shape,
-        "encoding": None if encoding is None else str(encoding), "eye": None if eye is None else attrs.asdict(eye),
-    }  # fmt: skip
+        "version": VERSION,
+        "model": split_words(str(model))[0],
+        "parameters": {key: value for key, value in model.parameters.items() if key != "device"},
+        "shape": model.shape,
+        "encoding": None if encoding is None else str(encoding),
+        "eye": None if eye is None else attrs.asdict(eye),
+    }
     tensors = {f"learned.{key}": tensor.detach().cpu().contiguous() for key, tensor in model.learned.items()}
-    if poses is not None:
-        tensors["poses"] = torch.tensor(poses)
+    if trained.poses is not None:
+        tensors["poses"] = torch.tensor(trained.poses)
     with replacing(path) as partial:
         partial.write_bytes(save(tensors, {HEADER: json.dumps(header, default=lambda number: number.item())}))
 
 
-def check_poses(path: str | os.PathLike, model: Model, poses: np.ndarray) -> None:
-    """Refuse poses that are not those of the views a trained model learned. Raises InputError."""
-    if not (poses.ndim == 2 and poses.shape[1] == 3 and np.isfinite(poses).all()):
-        raise InputError(f"{path}: its poses are not (n, 3) finite numbers; train it anew")
-    snapshots, last = model.learned.get("snapshots"), model.learned.get("index")  # which matches are looked up by
-    if snapshots is not None and len(poses) != len(snapshots):
-        raise InputError(f"{path}: {len(poses)} poses for {len(snapshots)} snapshots; give the pose of each, or none")
-    if last is not None and len(poses) <= int(last):
-        raise InputError(f"{path}: {len(poses)} poses, and it knows view {int(last)}; give the pose of each, or none")
-
-
-def first_line(error: Exception) -> str:
-    """What an exception says, without the lines that only programmers read."""
-    return (str(error).splitlines() or [type(error).__name__])[0]
-
-
 def load_model(path: str | os.PathLike, *, expect: str | None = None, device: str = "cpu") -> TrainedModel:
-    """Read a trained model. Raises InputError for what is no such file, is damaged, or holds another model than `expect`."""
+    """Read a trained model.
+
+    A file names the class of its model and the steps of its encoding, but imports no code. A class from outside must be registered,
+    an entry point of an installed package, or imported by its name before.
+
+    Args:
+        path: The file.
+        expect: Name of the model that it must hold; None means any.
+        device: Where the model scans.
+
+    Raises:
+        FileError: For a file that is not a model file, is damaged, or holds another model than `expect`.
+        SettingError: For a device that cannot be used, or has too little memory.
+    """
+    check_device(device)
     path = Path(path)
+    try:
+        header, tensors = _read(path)
+        if header.get("version") != VERSION:
+            raise FileError(
+                f"{path} is a model file of version {header.get('version')}, this is version {VERSION}; train it anew"
+            )
+        if expect is not None and header.get("model") != expect:
+            raise FileError(f"{path} holds a model {header.get('model')!r}, not {expect!r}; give another file")
+        return _trained(path, header, tensors, device)
+    except FileError:
+        raise
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError) as error:
+        if _is_out_of_memory(error):
+            raise SettingError(
+                f"{path}: too little memory on device {device!r} ({first_line(error)}); free some, or give another device"
+            ) from error
+        raise FileError(f"{path} is damaged, or of another version ({first_line(error)}); train it anew") from error
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
+    """Header and tensors of a file. Raises FileError for anything but a model file."""
     if not os.path.isfile(path):  # False for names too long, too
-        raise InputError(f"there is no model file {path}")
+        raise FileError(f"there is no model file {path}")
     try:
         with safetensors.safe_open(path, framework="pt") as file:
             header = json.loads((file.metadata() or {})[HEADER])
             if not isinstance(header, dict):
-                raise ValueError("its header is no object")
-            tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118
+                raise ValueError("its header is not an object")
+            return header, {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118
     except (safetensors.SafetensorError, KeyError, ValueError, RecursionError) as error:
-        raise InputError(
-            f"{path} is no model file of tussock's ({first_line(error)}); make one with tussock train"
+        raise FileError(
+            f"{path} is not a model file of tussock ({first_line(error)}); make one with tussock train"
         ) from error
-    if header.get("version") != VERSION:
-        raise InputError(
-            f"{path} is a model file of version {header.get('version')}, this is version {VERSION}; train it anew"
-        )
-    if expect is not None and header.get("model") != expect:
-        raise InputError(f"{path} holds a model {header.get('model')!r}, not {expect!r}")
-    check_device(device)
+
+
+def _trained(path: Path, header: dict[str, Any], tensors: dict[str, torch.Tensor], device: str) -> TrainedModel:
+    """The trained model that header and tensors describe. Raises errors of many kinds where they are damaged."""
+    name, text = header["model"], header["encoding"]
+    _check_known(path, name, text)
+    height, width = header["shape"]
+    target = find_model(name, importing=False)
+    given = {key: tuple(value) if isinstance(value, list) else value for key, value in header["parameters"].items()}
+    model = Spec(name, target, present_names(target, given)).make(device=device)
     poses = tensors.pop("poses", None)
-    learned = {key.removeprefix("learned."): tensor for key, tensor in tensors.items()}
-    try:
-        height, width = header["shape"]
-        parameters = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in header["parameters"].items()
-        }
-        model = make_model(header["model"], **parameters, device=device)
-        model.check_parameters()
-        model.restore((height, width), learned)
-        scan = model.scan(torch.zeros(1, height, width))  # what does not fit together shows here
-        if scan.shape != (1, width) or not torch.isfinite(scan).all():
-            raise ValueError("its numbers make no scan")
-        encoding = None if header["encoding"] is None else Encoding.parse(header["encoding"])
-        eye = None if header["eye"] is None else Eye(**header["eye"])
-        if poses is not None and not poses.is_floating_point():
-            raise ValueError(f"its poses are {poses.dtype}")
-        where = None if poses is None else poses.double().numpy()
-    except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError) as error:
-        raise InputError(f"{path} is damaged, or of another version ({first_line(error)}); train it anew") from error
-    if where is not None:
-        check_poses(path, model, where)
-    return TrainedModel(model=model, encoding=encoding, eye=eye, poses=where)
+    model.restore((height, width), {key.removeprefix("learned."): tensor for key, tensor in tensors.items()})
+    scan = model.scan(torch.zeros(1, height, width))  # tensors that do not fit together fail here
+    if scan.shape != (1, width):
+        raise ValueError("its numbers make no scan")
+    if poses is not None and not poses.is_floating_point():
+        raise ValueError(f"its poses are {poses.dtype}")
+    return TrainedModel(
+        model=model,
+        encoding=None if text is None else Encoding.parse(text, importing=False),
+        eye=None if header["eye"] is None else Eye(**header["eye"]),
+        poses=None if poses is None else poses.double().numpy(),
+    )
+
+
+def _check_known(path: Path, model: str, encoding: str | None) -> None:
+    """Refuse a file that needs classes from outside that are not known in this process. Raises FileError."""
+    steps = [] if encoding is None else [part.split()[0] for part in encoding.split("|")]
+    needed = [(MODELS, model.removeprefix(OPPONENT)), *((STEPS, OLD_NAMES.get(step, step)) for step in steps)]
+    for registry, name in needed:
+        if name not in registry:
+            raise FileError(
+                f"{path} needs the {registry.kind} {name!r}, which is not known here; install its package, or name it with "
+                "--use package.module:Class"
+            )
+
+
+def _is_out_of_memory(error: Exception) -> bool:
+    """Whether an error means too little memory, on a GPU or on the CPU, where torch raises no class of its own."""
+    return isinstance(error, MemoryError | torch.cuda.OutOfMemoryError) or "DefaultCPUAllocator" in str(error)

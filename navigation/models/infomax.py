@@ -1,46 +1,47 @@
 """Infomax: learn a view, discard it, keep only how the network changed."""
 
-from dataclasses import dataclass
-
-import numpy as np
 import torch
 from jaxtyping import Float32
 
-from .base import Images, IncrementalModel, Learned, Scans
+from tussock.world.settings import number, whole
+
+from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
 from .filter_bank import FilterBank
 
-# Presets in use, as eta / N: the rate of one update for `units` units of `inputs` inputs.
+# Presets of the rate: eta / N of one update, for `units` units of `inputs` inputs.
 RATES = {
-    "z-scored": lambda inputs, units: (
-        1.0 / (inputs * units)
-    ),  # views of mean 0 and variance 1, as the edges encoding makes
-    "unit-range": lambda inputs, units: 0.97 / (inputs * units),  # views in 0..1 (BoB robotics)
-    "baddeley": lambda inputs, units: 0.01 / units,  # Baddeley et al. 2012; Knight et al. 2019
+    # for views of mean 0 and variance 1, as the edges encoding makes
+    "z-scored": lambda inputs, units: 1.0 / (inputs * units),
+    # for views in 0..1 (BoB robotics)
+    "unit-range": lambda inputs, units: 0.97 / (inputs * units),
+    # Baddeley et al. 2012; Knight et al. 2019
+    "baddeley": lambda inputs, units: 0.01 / units,
 }
+UNITS = 2500  # units whose inputs at all rotations are computed at once; limits the memory that this takes
 
 
-@dataclass(kw_only=True, eq=False)
+@model
 class Infomax(IncrementalModel):
-    """A layer of tanh units decorrelated by each view once; familiarity is minus the sum of their absolute inputs.
+    """A layer of tanh units that each view decorrelates once; familiarity is minus the sum of the absolute inputs of the units.
 
     For a view x: u = W x, y = tanh u, W += eta / N (W - (y + u) (W^T u)^T). Section 3.3.3 of the thesis. Constant memory.
 
-    units: how many; None is as many as pixels. rate: "z-scored", "unit-range" or "baddeley" (see RATES), or eta / N itself.
-    traversals: how often the views are passed, in order.
+    Attributes:
+        units: Number of units; None means as many as pixels.
+        rate: "z-scored", "unit-range" or "baddeley" (see RATES), or the value of eta / N.
+        traversals: Passes over the views, in their order.
     """
 
     name = "infomax"
     paper = "Baddeley et al. 2012"
 
-    CHOICES = {"rate": RATES}  # noqa: RUF012
-    LIMITS = {"rate": (0.0, np.inf)}  # noqa: RUF012
-    units: int | None = None
-    rate: str | float = "z-scored"
-    traversals: int = 1
+    units: int | None = whole(None, optional=True)
+    rate: str | float = number("z-scored", low=0, names=RATES)
+    traversals: int = whole(1)
 
     def _begin(self, height: int, width: int) -> Learned:
         inputs = height * width
-        weights = self._here(torch.randn(self.units or inputs, inputs, generator=self._random()))
+        weights = self._on_device(torch.randn(self.units or inputs, inputs, generator=self._random()))
         deviation, mean = torch.std_mean(weights, dim=1, keepdim=True)
         return {"weights": ((weights - mean) / deviation).reshape(-1, height, width)}
 
@@ -53,16 +54,16 @@ class Infomax(IncrementalModel):
                 infomax_update(weights, view, rate)
         return {"weights": weights.reshape(-1, *views.shape[1:])}
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+    def _shapes(self, height: int, width: int) -> Shapes:
         return {"weights": (self.units or height * width, height, width)}
 
     def _prepare(self) -> None:
-        self._bank = FilterBank(self.learned["weights"])
+        self._banks = [FilterBank(weights) for weights in self.learned["weights"].split(UNITS)]
 
     def _scan(self, views: Images) -> Scans:
         total = torch.zeros(len(views), views.shape[2], device=views.device)
-        for responses in self._bank.chunks(views):
-            total -= responses.abs().sum(dim=2)
+        for bank in self._banks:
+            total -= bank.responses(views).abs_().sum(dim=2)
         return total
 
 

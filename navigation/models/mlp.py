@@ -1,7 +1,6 @@
 """The thesis's classifier: a multi-layer perceptron that tells views along the route from turned ones."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -14,10 +13,12 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from threadpoolctl import threadpool_limits
 from torch.nn.functional import binary_cross_entropy_with_logits, linear
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 from tussock.world.geometry import columns_of_turn
+from tussock.world.settings import choice, number, numbers, whole, wholes
 
-from .base import Images, Learned, Model, Scans, check_scan, check_training
+from .base import Images, Learned, Model, Scans, Shapes, model
+from .checks import check_scan, check_training
 from .filter_bank import FilterBank
 
 ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
@@ -26,60 +27,82 @@ ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
     "tanh": torch.tanh,
     "relu": torch.relu,
 }
-SMALL = 4 * 10**6  # multiplications in a pass over the views
+SMALL = 4 * 10**6  # multiplications in a pass over the views; below it, one thread is the quickest
 PATIENCE = 10  # passes without progress after which sgd and adam stop
 
 Layers = list[tuple[torch.Tensor, torch.Tensor]]  # weights (outputs, inputs) and biases (outputs,)
+Views = Images | Float[np.ndarray, "n ..."]
 
 
-@dataclass(kw_only=True, eq=False, repr=False)
+@model
 class MLP(ClassifierMixin, BaseEstimator, Model):
     """Trained on each view (on the route) and on turned copies of it (off the route); familiarity is the log-odds of "on".
 
-    Section 4.4 of the thesis. Parameters are scikit-learn's MLPClassifier's, with its defaults but for max_iter, and so is what
-    `fit(views, y)`, `predict`, `predict_proba` and `get_params` do: GridSearchCV takes it. `fit(views)` makes the negatives.
+    Section 4.4 of the thesis. A scikit-learn classifier: parameters are those of MLPClassifier, with its defaults but for max_iter,
+    and so are `fit(views, y)`, `predict`, `predict_proba` and `get_params`; GridSearchCV takes it. `fit(views)` makes the negatives.
     The log-odds order views as the probability does, but do not saturate. Constant memory.
 
-    hidden_layer_sizes: units of each hidden layer. activation: identity, logistic, tanh or relu. solver: lbfgs, sgd or adam.
-    alpha: L2 penalty. tol: progress under which training ends. max_iter: passes over the views at most.
-    negatives_deg: how far the copies are turned to the left; each view is given `negatives_each` of them, in rotation.
+    Attributes:
+        hidden_layer_sizes: Units of each hidden layer.
+        activation: identity, logistic, tanh or relu.
+        solver: lbfgs, sgd or adam.
+        alpha: L2 penalty.
+        batch_size: Views per step of sgd and adam.
+        learning_rate_init: Learning rate of sgd and adam.
+        max_iter: Limit of passes over the views.
+        tol: Progress in the loss below which training ends.
+        negatives_deg: How far the copies are turned to the left (deg).
+        negatives_each: Copies of each view, which takes the turns one after the other.
     """
 
     name = "mlp"
     paper = "the thesis, section 4.4"
+    dtypes = {"classes": None}  # noqa: RUF012
 
-    CHOICES = {"activation": ACTIVATIONS, "solver": ("lbfgs", "sgd", "adam")}  # noqa: RUF012
-    hidden_layer_sizes: tuple[int, ...] | int = (100,)
-    activation: str = "relu"
-    solver: str = "adam"
-    alpha: float = 1e-4
-    batch_size: int = 200
-    learning_rate_init: float = 1e-3
-    max_iter: int = 600
-    tol: float = 1e-4
-    negatives_deg: tuple[float, ...] = (-60.0, 60.0)
-    negatives_each: int = 1
+    hidden_layer_sizes: tuple[int, ...] | int = wholes((100,), single=True)
+    activation: str = choice("relu", ACTIVATIONS)
+    solver: str = choice("adam", ("lbfgs", "sgd", "adam"))
+    alpha: float = number(1e-4, low=0)
+    batch_size: int = whole(200)
+    learning_rate_init: float = number(1e-3, low=0)
+    max_iter: int = whole(600)
+    tol: float = number(1e-4, low=0)
+    negatives_deg: tuple[float, ...] = numbers((-60.0, 60.0), unit="deg")
+    negatives_each: int = whole(1)
 
-    def fit(self, views: Images | Float[np.ndarray, "n ..."], y: Any = None) -> "MLP":
-        """Train from scratch: on views (n, h, w) and the negatives made of them, or on views (n, h, w) or (n, pixels) and labels.
+    def __sklearn_clone__(self) -> "MLP":
+        """An untrained copy. scikit-learn's own way demands that a parameter is the very object that was given."""
+        return type(self)(**self.parameters)
 
-        y: labels (n,) of two different numbers, of which the larger stands for "on the route".
+    def fit(self, views: Views, y: Any = None) -> "MLP":
+        """Train from scratch.
+
+        Args:
+            views: (n, h, w), or with labels also (n, pixels).
+            y: (n,) Labels: two different numbers, of which the larger means "on the route". None means that the views are on the route,
+                and the negatives are made of them.
+
+        Raises:
+            SettingError: For views that cannot be learned, and for other labels.
         """
         images = as_images(views)
         if y is None:
             return super().fit(images)
-        self.check_parameters()
         check_training(images)
-        found = np.asarray(y)
-        if found.shape != (len(images),):
-            raise InputError(f"{len(images)} views and labels of shape {found.shape}; give each view one")
-        classes = np.unique(found) if found.dtype.kind in "biuf" else found
+        labels = np.asarray(y)
+        if labels.shape != (len(images),):
+            raise SettingError(f"{len(images)} views and labels of shape {labels.shape}; give each view one")
+        classes = np.unique(labels) if labels.dtype.kind in "biuf" else labels
         if classes.dtype.kind not in "biuf" or not np.isfinite(classes).all() or len(classes) != 2:
-            raise InputError(f"labels {classes[:4].tolist()}; give two different numbers")
-        targets = torch.as_tensor(found == classes[1], dtype=torch.float32)
-        learned = self._classify(self._here(images), targets, torch.as_tensor(classes))
+            raise SettingError(f"labels {classes[:4].tolist()}; give two different numbers")
+        targets = torch.as_tensor(labels == classes[1], dtype=torch.float32)
+        learned = self._classify(self._on_device(images), targets, torch.as_tensor(classes))
         self.restore((images.shape[1], images.shape[2]), learned)
         return self
+
+    def score(self, views: Views, y: Any = None, sample_weight: Any = None) -> Any:  # type: ignore[override]
+        """Familiarity (n,) of views as they are; with labels the share that is predicted right, as scikit-learn has it."""
+        return Model.score(self, as_images(views)) if y is None else super().score(views, y, sample_weight)
 
     def training_data(self, views: Images) -> tuple[Float32[torch.Tensor, "m h w"], Float32[torch.Tensor, " m"]]:
         """The views labelled 1, followed by turned copies of them labelled 0."""
@@ -91,18 +114,18 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         ]
         return torch.cat([views, torch.stack(turned)]), torch.cat([torch.ones(len(views)), torch.zeros(len(turned))])
 
-    def decision_function(self, views: Images | Float[np.ndarray, "n ..."]) -> Float[np.ndarray, " n"]:
+    def decision_function(self, views: Views) -> Float[np.ndarray, " n"]:
         """Log-odds of the second class for views as they are."""
         images = as_images(views)
         check_scan(images, self.shape)
-        return forward(self._here(images.flatten(start_dim=1)), self._layers, self.activation).cpu().numpy()
+        return forward(self._on_device(images.flatten(start_dim=1)), self._layers, self.activation).cpu().numpy()
 
-    def predict_proba(self, views: Images | Float[np.ndarray, "n ..."]) -> Float[np.ndarray, "n 2"]:
+    def predict_proba(self, views: Views) -> Float[np.ndarray, "n 2"]:
         """Probability of each class for views as they are."""
         second = expit(self.decision_function(views).astype(float))
         return np.column_stack([1 - second, second])
 
-    def predict(self, views: Images | Float[np.ndarray, "n ..."]) -> np.ndarray:
+    def predict(self, views: Views) -> np.ndarray:
         """The more probable class of each view."""
         return self.classes_[(self.decision_function(views) > 0).astype(int)]
 
@@ -119,7 +142,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
     ) -> Learned:
         """A network that tells images whose target is 1 from those whose target is 0."""
         learned: Learned = {"classes": classes}
-        for k, (weights, biases) in enumerate(self._train(images.flatten(start_dim=1), self._here(targets))):
+        for k, (weights, biases) in enumerate(self._train(images.flatten(start_dim=1), self._on_device(targets))):
             learned |= {f"weights{k}": weights, f"biases{k}": biases}
         return learned
 
@@ -128,8 +151,8 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         hidden = self.hidden_layer_sizes
         return [pixels, *((hidden,) if isinstance(hidden, int) else hidden), 1]
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
-        shapes: dict[str, tuple[int | None, ...]] = {"classes": (2,)}
+    def _shapes(self, height: int, width: int) -> Shapes:
+        shapes: Shapes = {"classes": (2,)}
         for k, (before, after) in enumerate(pairwise(self._sizes(height * width))):
             shapes |= {f"weights{k}": (after, before), f"biases{k}": (after,)}
         return shapes
@@ -144,23 +167,16 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
     def _scan(self, views: Images) -> Scans:
         """The first layer's weights are the engine's filters; the others see its units at each rotation."""
         activity = self._bank.responses(views)  # (n, w, units)
-        rest = self._layers[1:]
-        return forward(ACTIVATIONS[self.activation](activity), rest, self.activation)
+        return forward(ACTIVATIONS[self.activation](activity), self._layers[1:], self.activation)
 
     def _train(self, inputs: torch.Tensor, targets: torch.Tensor) -> Layers:
         """Fitted layers."""
         random = self._random()
-        factor = 2 if self.activation == "logistic" else 6
-        layers = []
-        for before, after in pairwise(self._sizes(inputs.shape[1])):
-            bound = (factor / (before + after)) ** 0.5  # Glorot's
-            draw = [(torch.rand(shape, generator=random) * 2 - 1) * bound for shape in ((after, before), (after,))]
-            layers.append(tuple(self._here(each) for each in draw))
+        layers = self._first_layers(inputs.shape[1], random)
+        restored = None
         if self.solver != "adam" and inputs.shape[1] > len(inputs):
             inputs, layers[0], restored = in_span(inputs, layers[0])
-        else:
-            restored = None
-        layers = [tuple(each.requires_grad_() for each in layer) for layer in layers]
+        layers = [(weights.requires_grad_(), biases.requires_grad_()) for weights, biases in layers]
 
         def loss(inputs: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
             fit = binary_cross_entropy_with_logits(forward(inputs, layers, self.activation), targets)
@@ -168,7 +184,6 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
         parameters = [each for layer in layers for each in layer]
         products = len(inputs) * sum(weights.numel() for weights, _ in layers)
-        # Small ones are quickest on one thread, and far quicker where other programs keep the cores busy.
         with threadpool_limits(1 if products < SMALL else None):
             if self.solver == "lbfgs":
                 self._minimise(parameters, lambda: loss(inputs, targets))
@@ -176,6 +191,16 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
                 self._descend(parameters, loss, inputs, targets, random)
         fitted = [(weights.detach(), biases.detach()) for weights, biases in layers]
         return fitted if restored is None else [restored(*fitted[0]), *fitted[1:]]
+
+    def _first_layers(self, pixels: int, random: torch.Generator) -> Layers:
+        """Random layers to begin with, as Glorot and Bengio (2010) draw them."""
+        factor = 2 if self.activation == "logistic" else 6
+        layers = []
+        for before, after in pairwise(self._sizes(pixels)):
+            bound = (factor / (before + after)) ** 0.5
+            draw = [(torch.rand(shape, generator=random) * 2 - 1) * bound for shape in ((after, before), (after,))]
+            layers.append((self._on_device(draw[0]), self._on_device(draw[1])))
+        return layers
 
     def _minimise(self, parameters: list[torch.Tensor], loss: Callable[[], torch.Tensor]) -> None:
         """L-BFGS on all data at once, as scikit-learn does it."""
@@ -189,13 +214,18 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
         start = torch.nn.utils.parameters_to_vector(parameters).detach().double().cpu().numpy()
         options = {"maxiter": self.max_iter, "maxfun": 15_000, "gtol": self.tol, "ftol": 64 * np.finfo(float).eps}
-        found = minimize(value_and_gradient, start, jac=True, method="L-BFGS-B", options=options)
+        best = minimize(value_and_gradient, start, jac=True, method="L-BFGS-B", options=options).x
         with torch.no_grad():
-            torch.nn.utils.vector_to_parameters(torch.as_tensor(found.x).to(parameters[0]), parameters)
+            torch.nn.utils.vector_to_parameters(torch.as_tensor(best).to(parameters[0]), parameters)
 
     def _descend(
-        self, parameters: list[torch.Tensor], loss: Callable, inputs: torch.Tensor, targets: torch.Tensor, random: torch.Generator
-    ) -> None:  # fmt: skip
+        self,
+        parameters: list[torch.Tensor],
+        loss: Callable,
+        inputs: torch.Tensor,
+        targets: torch.Tensor,
+        random: torch.Generator,
+    ) -> None:
         """Stochastic gradient descent with Nesterov momentum, or Adam, until the loss no longer falls."""
         rate = self.learning_rate_init
         optimiser = (
@@ -222,9 +252,12 @@ def in_span(inputs: torch.Tensor, layer: tuple) -> tuple[torch.Tensor, tuple, Ca
     """Views and first layer in an orthonormal basis, for views (n, pixels) that have more pixels than there are views.
 
     Gradients of the weights lie in the span of the views, all but that of the penalty, which shrinks what is orthogonal to it. So
-    n coordinates of a unit's weights, and the length of their orthogonal rest, are all that training by a method that rotations of
-    the weights do not change can alter: gradient descent and L-BFGS, not Adam. (L-BFGS stops by the largest component of the
-    gradient, which is another one here.) Returns views, layer and the way back of a layer.
+    n coordinates of a unit's weights, and the length of their orthogonal rest, are all that training can change, by a method for
+    which rotations of the weights make no difference: gradient descent and L-BFGS, not Adam. (L-BFGS stops by the largest component
+    of the gradient, which is another one here.)
+
+    Returns:
+        The views, the layer, and a function that brings a layer back.
     """
     weights, biases = layer
     basis = torch.linalg.qr(inputs.T).Q  # (pixels, n)
@@ -249,7 +282,7 @@ def forward(inputs: torch.Tensor, layers: Layers, activation: str) -> torch.Tens
     return inputs[..., 0]
 
 
-def as_images(views: Images | Float[np.ndarray, "n ..."]) -> Images:
+def as_images(views: Views) -> Images:
     """Views as the models take them; rows of pixels (n, pixels) become images of one row."""
     images = torch.as_tensor(views, dtype=torch.float32)
     return images[:, None] if images.ndim == 2 else images

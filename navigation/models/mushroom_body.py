@@ -1,87 +1,114 @@
 """A mushroom body: many sparsely wired Kenyon cells, and one output whose synapses weaken where a view was seen."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from jaxtyping import Float32
 from torch.nn.functional import embedding_bag
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
+from tussock.world.settings import number, whole
 
-from .base import Images, IncrementalModel, Learned, Scans
-from .filter_bank import FilterBank, smoothed
+from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
+from .filter_bank import FilterBank
+from .rotations import smoothed
 
-MOST_SHARES = 2**28  # of pixels in fields: 1 GB
-AT_ONCE = 128  # views that are learned
+MAX_NUMBERS = 2**28  # in an array that is made on the way: 1 GB
+BATCH = 128  # views that are learned at once
 
 
-@dataclass(kw_only=True, eq=False)
+@model
 class MushroomBody(IncrementalModel):
     """Projection neurons, Kenyon cells with few random inputs each, and anti-Hebbian depression of their output synapses.
 
     Projection neurons average the view over the fields of a grid of `columns` x `rows`, less the mean at their elevation and divided
     by the contrast there to the power of `adaptation` (lateral inhibition and gain control). A Kenyon cell sums `inputs` of them;
-    at any view the share `active` of the cells with the largest sums fires. Learning a view multiplies the output synapses of the
-    cells that fire by 1 - `depression`. Familiarity is minus their mean over the cells that fire, averaged over
-    neighbouring rotations (Gaussian, standard deviation `smoothing_deg`), as a head that sways would. Constant memory.
+    the share `active` of the cells with the largest sums fires. Learning a view multiplies the output synapses of the cells that
+    fire by 1 - `depression`. Familiarity is minus the mean synapse of the cells that fire, averaged over neighbouring rotations.
+    Constant memory.
+
+    Attributes:
+        columns: Fields around the circle.
+        rows: Fields from top to bottom.
+        cells: Number of Kenyon cells.
+        inputs: Projection neurons per Kenyon cell.
+        active: Share of the Kenyon cells that fires.
+        depression: Share of its strength that the synapse of a firing cell loses when a view is learned.
+        adaptation: Exponent of the contrast; 0 is no adaptation, 1 is complete.
+        smoothing_deg: Standard deviation of the Gaussian over neighbouring rotations (deg), for a head that moves to and fro.
     """
 
     name = "mushroom-body"
     paper = "Ardin et al. 2016"
+    dtypes = {"wiring": torch.int64}  # noqa: RUF012
 
-    LIMITS = {"active": (0.0, 1.0), "depression": (0.0, 1.0)}  # noqa: RUF012
-    columns: int = 36
-    rows: int = 10
-    cells: int = 20_000
-    inputs: int = 40
-    active: float = 0.003
-    depression: float = 0.8
-    adaptation: float = 0.25
-    smoothing_deg: float = 6.0
+    columns: int = whole(36)
+    rows: int = whole(10)
+    cells: int = whole(20_000)
+    inputs: int = whole(40)
+    active: float = number(0.003, low=0, high=1)
+    depression: float = number(0.8, low=0, high=1)
+    adaptation: float = number(0.25, low=0)
+    smoothing_deg: float = number(6.0, low=0, unit="deg")
+
+    def __attrs_post_init__(self):
+        neurons = self.columns * self.rows
+        if self.inputs > neurons:
+            raise SettingError(f"{self.name}: inputs is {self.inputs}, of {neurons} projection neurons; give fewer")
+        if self.cells * neurons > MAX_NUMBERS:
+            raise SettingError(
+                f"{self.name}: {self.cells} cells and {neurons} projection neurons (columns x rows) have over {MAX_NUMBERS:,} "
+                "possible connections; give fewer"
+            )
 
     @property
     def firing(self) -> int:
-        """How many Kenyon cells fire."""
+        """Number of Kenyon cells that fire."""
         return max(1, round(self.active * self.cells))
 
+    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
+        """As for all models; and every input of a Kenyon cell is a projection neuron."""
+        super().check_learned(shape, learned)
+        wiring, neurons = learned["wiring"], self.columns * self.rows
+        if not 0 <= int(wiring.min()) <= int(wiring.max()) < neurons:
+            raise SettingError(
+                f"{self.name}: cells are wired to neurons {int(wiring.min())} to {int(wiring.max())} of {neurons}"
+            )
+
     def _begin(self, height: int, width: int) -> Learned:
+        self.__attrs_post_init__()  # its parameters may have been changed one by one
+        self._check_fields(height, width)
         neurons = self.columns * self.rows
         wiring = torch.rand(self.cells, neurons, generator=self._random()).topk(self.inputs, dim=1).indices
-        return {"wiring": self._here(wiring.sort(dim=1).values), "synapses": torch.ones(self.cells, device=self.device)}
+        synapses = torch.ones(self.cells, device=self.device)
+        return {"wiring": self._on_device(wiring.sort(dim=1).values), "synapses": synapses}
 
     def _add(self, learned: Learned, views: Images) -> Learned:
         synapses = learned["synapses"].clone()
         fields = self._bank(*views.shape[1:])
-        for some in views.split(AT_ONCE):
-            unturned = torch.stack([self._projection(fields, view)[:, 0] for view in some], dim=1)
+        for batch in views.split(BATCH):
+            unturned = torch.stack([self._projection(fields, view)[:, 0] for view in batch], dim=1)
             for firing in self._firing(unturned, learned["wiring"]):
                 synapses[firing] *= 1 - self.depression
         return {"wiring": learned["wiring"], "synapses": synapses}
 
-    def check_parameters(self) -> None:
-        """As for all models; and a Kenyon cell has no more inputs than there are projection neurons."""
-        super().check_parameters()
-        if self.inputs > self.columns * self.rows:
-            raise InputError(
-                f"{self.name}: {self.inputs} inputs of {self.columns * self.rows} projection neurons; give fewer"
-            )
-
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+    def _shapes(self, height: int, width: int) -> Shapes:
         return {"wiring": (self.cells, self.inputs), "synapses": (self.cells,)}
 
     def _prepare(self) -> None:
         assert self.shape is not None
         self._fields = self._bank(*self.shape)
 
+    def _check_fields(self, height: int, width: int) -> None:
+        if self.columns * self.rows * height * width > MAX_NUMBERS:
+            raise SettingError(
+                f"{self.name}: {self.columns} x {self.rows} fields of {width} x {height} pixels are over {MAX_NUMBERS:,} numbers; "
+                "give fewer columns or rows, or smaller views"
+            )
+
     def _bank(self, height: int, width: int) -> FilterBank:
         """The fields of the projection neurons, for views of height x width."""
-        if self.columns * self.rows * height * width > MOST_SHARES:
-            raise InputError(
-                f"{self.name}: {self.columns} x {self.rows} fields of {width} x {height} pixels are over {MOST_SHARES:,} numbers; "
-                "give fewer, or smaller views (--resize)"
-            )
-        return FilterBank(receptive_fields(self.columns, self.rows, height, width).to(self.device))
+        self._check_fields(height, width)
+        return FilterBank(self._on_device(receptive_fields(self.columns, self.rows, height, width)))
 
     def _scan(self, views: Images) -> Scans:
         scans = []
@@ -91,7 +118,7 @@ class MushroomBody(IncrementalModel):
         return smoothed(torch.stack(scans), np.radians(self.smoothing_deg))
 
     def _projection(self, fields: FilterBank, view: Float32[torch.Tensor, "h w"]) -> Float32[torch.Tensor, "neurons w"]:
-        """What the projection neurons send at each rotation. Over all rotations, a field sees all of its elevation."""
+        """Output of the projection neurons at each rotation. Over all rotations, a field sees all of its elevation."""
         averages = fields.responses(view[None])[0].T
         contrast, mean = torch.std_mean(averages, dim=1, keepdim=True, correction=0)
         return (averages - mean) / (contrast + 0.02 * contrast.max() + 1e-9) ** self.adaptation
@@ -103,7 +130,7 @@ class MushroomBody(IncrementalModel):
 
 
 def receptive_fields(columns: int, rows: int, height: int, width: int) -> Float32[torch.Tensor, "neurons h w"]:
-    """Filters that average a view over the fields of a grid, each pixel counted by the share of it inside the field."""
+    """Filters that average a view over the fields of a grid, each pixel weighted by the share of it inside the field."""
 
     def shares(fields: int, pixels: int) -> torch.Tensor:
         edges = torch.arange(fields + 1) * (pixels / fields)

@@ -1,11 +1,16 @@
-"""Opponent memories: one draws the agent on, the other turns it away."""
+"""Opponent memories: one attracts the agent, the other turns it away."""
 
 import copy
+import inspect
+from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any, TypeVar
 
 import torch
 
-from .base import Images, IncrementalModel, Learned, Model, Scans
+from .base import FamiliarityModel, Images, IncrementalModel, Learned, Model, Scans, Shapes, memory_bytes
+
+OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
 
 T = TypeVar("T")
 
@@ -15,6 +20,10 @@ class Opponent(Model):
 
     Familiarity is the attractive memory's less the repulsive one's: their difference steers. The views that face away are the same
     ones turned by half a turn. Memory: twice the model's.
+
+    Attributes:
+        attractive: The model that learns the views.
+        repulsive: The model that learns the views turned by half a turn.
     """
 
     paper = "Le Moel and Wystrach 2020"
@@ -22,35 +31,35 @@ class Opponent(Model):
     def __init__(self, model: Model):
         super().__init__(device=model.device, seed=model.seed)
         self.attractive, self.repulsive = copy.deepcopy(model), copy.deepcopy(model)
-        self.name = f"opponent-{model.name}"
+        self.name = OPPONENT + model.name
 
     def __repr__(self) -> str:
         return f"Opponent({self.attractive!r})"
 
     def __str__(self) -> str:
-        return f"opponent-{self.attractive}"
+        return f"{OPPONENT}{self.attractive}"
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Those of the model it is made of."""
+        """Those of the model."""
         return self.attractive.parameters
 
-    def check_parameters(self) -> None:
-        """As the model it is made of."""
-        self.attractive.check_parameters()
+    @property
+    def dtypes(self) -> Mapping[str, torch.dtype | None]:  # type: ignore[override]
+        """Of learned tensors that are not float32."""
+        return _joined(self.attractive.dtypes, self.repulsive.dtypes)
 
     def _learn(self, views: Images) -> Learned:
-        return both(self.attractive._learn(views), self.repulsive._learn(facing_away(views)))
+        return _joined(self.attractive._learn(views), self.repulsive._learn(facing_away(views)))
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
-        shapes = self.attractive._shapes(height, width)
-        return both(shapes, shapes)
+    def _shapes(self, height: int, width: int) -> Shapes:
+        return _joined(self.attractive._shapes(height, width), self.repulsive._shapes(height, width))
 
     def _prepare(self) -> None:
         assert self.shape is not None
         for side in ("attractive", "repulsive"):
             model = copy.copy(getattr(self, side))
-            model.restore(self.shape, one(side, self.learned))
+            model.restore(self.shape, _part(self.learned, side))
             setattr(self, side, model)
 
     def _scan(self, views: Images) -> Scans:
@@ -64,16 +73,53 @@ class IncrementalOpponent(Opponent, IncrementalModel):
     repulsive: IncrementalModel
 
     def _begin(self, height: int, width: int) -> Learned:
-        return both(self.attractive._begin(height, width), self.repulsive._begin(height, width))
+        return _joined(self.attractive._begin(height, width), self.repulsive._begin(height, width))
 
     def _add(self, learned: Learned, views: Images) -> Learned:
-        attractive, repulsive = one("attractive", learned), one("repulsive", learned)
-        return both(self.attractive._add(attractive, views), self.repulsive._add(repulsive, facing_away(views)))
+        attractive, repulsive = _part(learned, "attractive"), _part(learned, "repulsive")
+        return _joined(self.attractive._add(attractive, views), self.repulsive._add(repulsive, facing_away(views)))
 
 
-def opponent(model: Model) -> Opponent:
-    """Opponent memories of an untrained model; they learn view by view where it does."""
-    return (IncrementalOpponent if isinstance(model, IncrementalModel) else Opponent)(model)
+class OutsideOpponent:
+    """Opponent memories of a model that does not derive from `Model`."""
+
+    def __init__(self, model: Any):
+        self.attractive, self.repulsive = copy.deepcopy(model), copy.deepcopy(model)
+
+    def fit(self, views: Images) -> "OutsideOpponent":
+        """Let both memories learn the views."""
+        self.attractive.fit(views)
+        self.repulsive.fit(facing_away(views))
+        return self
+
+    def scan(self, views: Images) -> Scans:
+        """Familiarity of each rotation, of the attractive memory less that of the repulsive one."""
+        return self.attractive.scan(views) - self.repulsive.scan(views)
+
+    @property
+    def memory_bytes(self) -> int | None:
+        """Size of what both have learned; None where the model does not report it."""
+        attractive, repulsive = memory_bytes(self.attractive), memory_bytes(self.repulsive)
+        return None if attractive is None or repulsive is None else attractive + repulsive
+
+
+def opponent(model: FamiliarityModel) -> Any:
+    """Opponent memories of an untrained model. They learn view by view, and can be saved, where the model does and can."""
+    if isinstance(model, IncrementalModel):
+        return IncrementalOpponent(model)
+    return Opponent(model) if isinstance(model, Model) else OutsideOpponent(model)
+
+
+@cache
+def opponents_of(cls: Callable[..., FamiliarityModel]) -> Callable[..., FamiliarityModel]:
+    """A function that makes opponent memories, with the parameters of a class of models."""
+
+    def make(**parameters: Any) -> FamiliarityModel:
+        return opponent(cls(**parameters))
+
+    make.__signature__ = inspect.signature(cls)  # type: ignore[attr-defined]
+    make.renamed = getattr(cls, "renamed", {})  # type: ignore[attr-defined]
+    return make
 
 
 def facing_away(views: Images) -> Images:
@@ -81,12 +127,12 @@ def facing_away(views: Images) -> Images:
     return torch.roll(views, views.shape[-1] // 2, dims=-1)
 
 
-def both(attractive: dict[str, T], repulsive: dict[str, T]) -> dict[str, T]:
-    """What two memories hold, by name, as one holds it."""
+def _joined(attractive: Mapping[str, T], repulsive: Mapping[str, T]) -> dict[str, T]:
+    """What two memories hold by name, in one mapping."""
     sides = {"attractive": attractive, "repulsive": repulsive}
     return {f"{side}.{key}": value for side, values in sides.items() for key, value in values.items()}
 
 
-def one(side: str, learned: Learned) -> Learned:
-    """What one memory holds of what `both` put together."""
+def _part(learned: Learned, side: str) -> Learned:
+    """What one memory holds of a mapping that `_joined` made."""
     return {key.removeprefix(f"{side}."): value for key, value in learned.items() if key.startswith(f"{side}.")}

@@ -1,48 +1,49 @@
 """A model that knows nothing: the control that others are measured against."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from jaxtyping import UInt64
 
-from .base import Images, Learned, Model, Scans
+from .base import Images, Learned, Model, Scans, Shapes, model
 
 
-@dataclass(kw_only=True, eq=False)
+@model
 class RandomHeadings(Model):
-    """Learns nothing of the views; familiarity is a random number from 0 to 1, for each rotation of each view another one.
+    """Learns nothing of the views; familiarity is a random number from 0 to 1, drawn for each rotation of each view.
 
-    The control of Ardin et al.: the most familiar heading is random, and where anything is seen differently it is another one. It is
-    a hash of the view as seen at that rotation, with weights drawn from the seed: the same view always has the same heading.
-    Memory: a weight for each row and each column.
+    The control of Ardin et al.: the most familiar heading is random, and differs where anything in the view differs. The number is
+    a hash of the view at that rotation, with weights drawn from the seed: the same view always has the same heading.
+    Memory: one weight for each row and each column.
     """
 
     name = "random"
     paper = "Ardin et al. 2016"
+    dtypes = {"rows": torch.int64, "columns": torch.int64}  # noqa: RUF012
 
     def _learn(self, views: Images) -> Learned:
         random = np.random.default_rng(self.seed)
         rows, columns = (random.integers(2**63, size=size) * 2 + 1 for size in views.shape[1:])  # odd, of 64 bits
-        return {"rows": self._here(torch.from_numpy(rows)), "columns": self._here(torch.from_numpy(columns))}
+        return {"rows": self._on_device(torch.from_numpy(rows)), "columns": self._on_device(torch.from_numpy(columns))}
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+    def _shapes(self, height: int, width: int) -> Shapes:
         return {"rows": (height,), "columns": (width,)}
 
     def _prepare(self) -> None:
         self._rows, columns = (self.learned[key].cpu().numpy().view(np.uint64) for key in ("rows", "columns"))
         column = np.arange(len(columns))
-        self._turned = columns[(column[:, None] + column) % len(columns)]  # where a column stands at each rotation
+        self._columns = columns[
+            (column[:, None] + column) % len(columns)
+        ]  # (w, w) weight of each column at each rotation
 
     def _scan(self, views: Images) -> Scans:
-        seen = views.cpu().numpy() + np.float32(0)  # -0 becomes 0
-        columns = mixed((seen.view(np.uint32).astype(np.uint64) * self._rows[:, None]).sum(axis=1))
-        hashes = mixed(columns @ self._turned)
-        return self._here(torch.from_numpy((hashes >> np.uint64(40)).astype(np.float32) * np.float32(2**-24)))
+        pixels = views.cpu().numpy() + np.float32(0)  # -0 becomes 0
+        columns = split_mix((pixels.view(np.uint32).astype(np.uint64) * self._rows[:, None]).sum(axis=1))
+        hashes = split_mix(columns @ self._columns)
+        return self._on_device(torch.from_numpy((hashes >> np.uint64(40)).astype(np.float32) * np.float32(2**-24)))
 
 
-def mixed(numbers: UInt64[np.ndarray, "..."]) -> UInt64[np.ndarray, "..."]:
-    """Each number by a bijection after which every bit depends on all: that of Steele, Lea and Flood's SplitMix (2014)."""
+def split_mix(numbers: UInt64[np.ndarray, "..."]) -> UInt64[np.ndarray, "..."]:
+    """A bijection after which every bit depends on all: that of Steele, Lea and Flood's SplitMix (2014)."""
     numbers = numbers + np.uint64(0x9E3779B97F4A7C15)
     numbers = (numbers ^ numbers >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
     numbers = (numbers ^ numbers >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)

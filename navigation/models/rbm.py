@@ -1,58 +1,76 @@
 """A restricted Boltzmann machine: a generative model of the route's views, trained without negatives."""
 
-from dataclasses import dataclass
-
 import torch
 from torch.nn.functional import softplus
 
-from .base import Images, Learned, Model, Scans
+from tussock.world.settings import number, whole
+
+from .base import Images, Learned, Model, Scans, Shapes, model
 from .filter_bank import FilterBank
 
 
-@dataclass(kw_only=True, eq=False)
+@model
 class RBM(Model):
     """Binary hidden units over Gaussian visible ones of unit variance; familiarity is minus the free energy of a view.
 
     F(v) = |v - b|^2 / 2 - sum over units j of log(1 + exp(c_j + w_j . v)), up to a constant minus the log-probability of the view.
     Trained by contrastive divergence with one step (CD-1). Section 3.3.2 of the thesis. Constant memory.
 
-    units: hidden ones. epochs: passes over the views. rate, momentum, batch_size: of the gradient ascent.
-    scale: the view is multiplied by this first, which sets how much noise a visible unit has.
+    Attributes:
+        units: Number of hidden units.
+        epochs: Passes over the views.
+        rate: Learning rate of the gradient ascent.
+        momentum: Of the gradient ascent.
+        batch_size: Views per step.
+        scale: The views are multiplied by this first; it decides how much noise a visible unit has.
     """
 
     name = "rbm"
     paper = "Hinton 2002; Philippides et al. 2015"
 
-    LIMITS = {"momentum": (0.0, 0.999)}  # noqa: RUF012
-    units: int = 200
-    epochs: int = 50
-    rate: float = 1e-3
-    momentum: float = 0.9
-    batch_size: int = 20
-    scale: float = 1.0
+    units: int = whole(200)
+    epochs: int = whole(50)
+    rate: float = number(1e-3, low=0)
+    momentum: float = number(0.9, low=0, high=0.999)
+    batch_size: int = whole(20)
+    scale: float = number(1.0, low=0)
 
     def _learn(self, views: Images) -> Learned:
         random = self._random()
         data = self.scale * views.flatten(start_dim=1)
-        inputs = data.shape[1]
-        weights = 0.01 * torch.randn(self.units, inputs, generator=random).to(self.device)
+        weights = 0.01 * torch.randn(self.units, data.shape[1], generator=random).to(self.device)
         visible, hidden = data.mean(dim=0), torch.zeros(self.units, device=self.device)
-        velocity = [torch.zeros_like(each) for each in (weights, visible, hidden)]
+        parameters = (weights, visible, hidden)
+        velocities = [torch.zeros_like(each) for each in parameters]
         for _ in range(self.epochs):
             for batch in torch.randperm(len(data), generator=random).split(self.batch_size):
-                seen = data[batch.to(self.device)]
-                on = torch.sigmoid(hidden + seen @ weights.T)
-                sample = (torch.rand(on.shape, generator=random).to(self.device) < on).float()
-                dreamt = visible + sample @ weights
-                on_again = torch.sigmoid(hidden + dreamt @ weights.T)
-                gradients = (on.T @ seen - on_again.T @ dreamt, (seen - dreamt).sum(dim=0), (on - on_again).sum(dim=0))
-                for parameter, speed, gradient in zip((weights, visible, hidden), velocity, gradients, strict=True):
-                    speed.mul_(self.momentum).add_(gradient, alpha=self.rate / len(batch))
-                    parameter += speed
+                gradients = self._gradients(data[batch.to(self.device)], *parameters, random)
+                for parameter, velocity, gradient in zip(parameters, velocities, gradients, strict=True):
+                    velocity.mul_(self.momentum).add_(gradient, alpha=self.rate / len(batch))
+                    parameter += velocity
         shape = views.shape[1:]
         return {"weights": weights.reshape(-1, *shape), "visible": visible.reshape(shape), "hidden": hidden}
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+    def _gradients(
+        self,
+        data: torch.Tensor,
+        weights: torch.Tensor,
+        visible: torch.Tensor,
+        hidden: torch.Tensor,
+        random: torch.Generator,
+    ) -> tuple[torch.Tensor, ...]:
+        """Of the log-probability of a batch by weights, visible and hidden biases, by CD-1."""
+        on = torch.sigmoid(hidden + data @ weights.T)
+        sample = (torch.rand(on.shape, generator=random).to(self.device) < on).float()
+        reconstruction = visible + sample @ weights
+        on_again = torch.sigmoid(hidden + reconstruction @ weights.T)
+        return (
+            on.T @ data - on_again.T @ reconstruction,
+            (data - reconstruction).sum(dim=0),
+            (on - on_again).sum(dim=0),
+        )
+
+    def _shapes(self, height: int, width: int) -> Shapes:
         return {"weights": (self.units, height, width), "visible": (height, width), "hidden": (self.units,)}
 
     def _prepare(self) -> None:
@@ -61,9 +79,8 @@ class RBM(Model):
         self._bank = FilterBank(filters, torch.cat([hidden, hidden.new_zeros(1)]))
 
     def _scan(self, views: Images) -> Scans:
-        responses = self._bank.responses(self.scale * views)  # (n, w, units + 1)
-        visible = self.learned["visible"]
-        squared = (
-            (self.scale * views).square().sum(dim=(1, 2))[:, None] - 2 * responses[..., -1] + visible.square().sum()
-        )
+        views = self.scale * views
+        responses = self._bank.responses(views)  # (n, w, units + 1)
+        of_views, of_visible = views.square().sum(dim=(1, 2)), self.learned["visible"].square().sum()
+        squared = of_views[:, None] - 2 * responses[..., -1] + of_visible
         return softplus(responses[..., :-1]).sum(dim=2) - squared / 2

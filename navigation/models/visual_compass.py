@@ -3,37 +3,39 @@
 import torch
 from jaxtyping import Int64
 
-from tussock.world.errors import InputError
+from tussock.world.errors import SettingError
 
-from .base import Images, Learned, Model, Scans
+from .base import Images, Learned, Model, Scans, Shapes, model
 from .perfect_memory import PerfectMemory
 
 
+@model
 class VisualCompass(Model):
-    """Keeps one view, the last it is given, which is the one at the goal; familiarity is minus the RMS difference from it.
+    """Keeps one view, the last one that it is given, at the goal; familiarity is minus the RMS difference from it.
 
     Section 4.2 of the thesis. Memory: one view.
     """
 
     name = "visual-compass"
     paper = "Zeil, Hofmann and Chahl 2003"
+    dtypes = {"index": torch.int64}  # noqa: RUF012
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and the index of the last learned view throughout."""
         familiarity = self.scan(views)
         return familiarity, self.learned["index"].expand(familiarity.shape)
 
+    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
+        """As for all models; and the index of the view is not negative."""
+        super().check_learned(shape, learned)
+        if learned["index"] < 0:
+            raise SettingError(f"{self.name}: the index of its view is {int(learned['index'])}, not 0 or more")
+
     def _learn(self, views: Images) -> Learned:
         return {"snapshot": views[-1:].clone(), "index": torch.tensor(len(views) - 1)}
 
-    def _shapes(self, height: int, width: int) -> dict[str, tuple[int | None, ...]]:
+    def _shapes(self, height: int, width: int) -> Shapes:
         return {"snapshot": (1, height, width), "index": ()}
-
-    def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
-        """As for all models; and the view has a place among those it was given."""
-        super().check_learned(shape, learned)
-        if learned["index"] < 0:
-            raise InputError(f"{self.name}: its view is number {int(learned['index'])}, which is none")
 
     def _prepare(self) -> None:
         self._memory = PerfectMemory(device=self.device).fit(self.learned["snapshot"])

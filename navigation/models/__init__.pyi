@@ -1,0 +1,17 @@
+from .adaboost import AdaBoost as AdaBoost
+from .autoencoder import Autoencoder as Autoencoder
+from .chain import Chain as Chain
+from .infomax import Infomax as Infomax
+from .mlp import MLP as MLP
+from .mlp_mixture import MLPMixture as MLPMixture
+from .mlp_rotation import MLPRotation as MLPRotation
+from .mushroom_body import MushroomBody as MushroomBody
+from .opponents import OPPONENT as OPPONENT
+from .opponents import opponent as opponent
+from .perfect_memory import PerfectMemory as PerfectMemory
+from .random import RandomHeadings as RandomHeadings
+from .rbm import RBM as RBM
+from .registry import MODELS as MODELS
+from .specs import make_model as make_model
+from .specs import model_spec as model_spec
+from .visual_compass import VisualCompass as VisualCompass

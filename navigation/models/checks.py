@@ -1,0 +1,64 @@
+"""What models refuse: devices, views and learned numbers that cannot be used."""
+
+import torch
+from jaxtyping import Float32
+
+from tussock.world.errors import SettingError
+
+# Columns of a view. At the upper limit the engine's matrices for the inverse transform take 67 MB each.
+MIN_COLUMNS, MAX_COLUMNS = 4, 8192
+MAX_VALUE = 1e12  # of a view, or learned: sums of squares over whole views stay far from the largest float32
+
+Images = Float32[torch.Tensor, "n h w"]
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that torch cannot use here. Raises SettingError."""
+    try:
+        torch.zeros(1, device=device).item()
+    except (RuntimeError, AssertionError, TypeError) as error:
+        raise SettingError(f"device {device!r} cannot be used here ({first_line(error)}); give cpu") from error
+
+
+def check_training(views: Images) -> None:
+    """Refuse views that no model can learn. Raises SettingError."""
+    if views.ndim != 3 or len(views) == 0:
+        raise SettingError(f"a model learns from at least one view (n, h, w), got shape {tuple(views.shape)}")
+    if views.shape[1] < 1 or not MIN_COLUMNS <= views.shape[2] <= MAX_COLUMNS:
+        raise SettingError(
+            f"views of {views.shape[2]} x {views.shape[1]} pixels; give {MIN_COLUMNS} to {MAX_COLUMNS} columns and at least one row"
+        )
+    check_values(views)
+
+
+def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
+    """Refuse views that a model trained on images of `shape` (None: not trained) cannot scan. Raises SettingError."""
+    if shape is None:
+        raise SettingError("this model has learned nothing yet; call fit(views) first")
+    if views.ndim != 3 or tuple(views.shape[1:]) != tuple(shape):
+        raise SettingError(
+            f"this model learned views of shape {tuple(shape)}, got {tuple(views.shape[1:])}; encode both in the same way"
+        )
+    check_values(views)
+
+
+def check_values(views: Images) -> None:
+    """Refuse views that are not float32, and values that are not finite or over MAX_VALUE. Raises SettingError."""
+    if views.dtype != torch.float32:
+        raise SettingError(f"views are float32, got {views.dtype}; give views.float()")
+    if not all_bounded(views):
+        bad = int((views.abs() <= MAX_VALUE).flatten(start_dim=1).all(dim=1).int().argmin())
+        raise SettingError(f"view {bad} holds values that are not finite, or over {MAX_VALUE:g}; check the encoding")
+
+
+def all_bounded(tensor: torch.Tensor) -> bool:
+    """Whether all values are finite and within MAX_VALUE."""
+    if tensor.numel() == 0:
+        return True
+    least, greatest = tensor.aminmax()
+    return float(least) >= -MAX_VALUE and float(greatest) <= MAX_VALUE  # both are nan if a value is
+
+
+def first_line(error: Exception) -> str:
+    """The message of an exception, without the lines that only programmers read."""
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,25 @@
+"""Where the familiarity models stand, by name."""
+
+from tussock.world.registry import Registry
+
+MODELS = Registry(
+    "models",
+    "model",
+    {
+        name: f"tussock.navigation.models.{where}"
+        for name, where in {
+            "random": "random:RandomHeadings",
+            "visual-compass": "visual_compass:VisualCompass",
+            "perfect-memory": "perfect_memory:PerfectMemory",
+            "chain": "chain:Chain",
+            "mlp": "mlp:MLP",
+            "mlp-rotation": "mlp_rotation:MLPRotation",
+            "mlp-mixture": "mlp_mixture:MLPMixture",
+            "adaboost": "adaboost:AdaBoost",
+            "rbm": "rbm:RBM",
+            "autoencoder": "autoencoder:Autoencoder",
+            "infomax": "infomax:Infomax",
+            "mushroom-body": "mushroom_body:MushroomBody",
+        }.items()
+    },
+)

@@ -1,0 +1,43 @@
+"""What models do with all rotations of a view: take views in batches, weigh rotations, smooth over them."""
+
+import math
+
+import numpy as np
+import torch
+from jaxtyping import Float32
+
+from tussock.world.geometry import turn_of_columns
+
+ROTATIONS = 6144  # of views that a model scores at once; what is held on the way is then 100 MB or so
+
+
+def in_batches(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Tensor, "batch h w"], ...]:
+    """Views in batches that have ROTATIONS at most, but at least one view each."""
+    size = max(1, ROTATIONS // views.shape[2])
+    return views.tensor_split(max(1, math.ceil(len(views) / size)))
+
+
+def bell(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:
+    """A Gaussian over the rotations about rotation 0, of sum 1.
+
+    Args:
+        width: Number of rotations.
+        deviation: Its standard deviation (rad), over 0.
+    """
+    turns = torch.as_tensor(turn_of_columns(np.arange(width), width), dtype=torch.float32)
+    return torch.softmax(-0.5 * (turns / deviation) ** 2, dim=0)
+
+
+def smoothed(scans: Float32[torch.Tensor, "n w"], deviation: float) -> Float32[torch.Tensor, "n w"]:
+    """Each rotation averaged with its neighbours.
+
+    Args:
+        scans: (n, w)
+        deviation: Standard deviation (rad) of the Gaussian weights; 0 leaves the scans as they are.
+    """
+    if deviation == 0:
+        return scans
+    width = scans.shape[1]
+    rotation = torch.arange(width)
+    weights = bell(width, deviation)[(rotation[:, None] - rotation) % width]
+    return scans @ weights.to(scans.device)
