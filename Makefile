@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: run test lint format bench clean
+.PHONY: run test test-slow lint format bench clean
 
 run: $(VENV)/installed  ## install, grow a world, learn a route, walk it home, say how to watch it
 	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
@@ -14,8 +14,11 @@ run: $(VENV)/installed  ## install, grow a world, learn a route, walk it home, s
 	@echo "    $(BIN)/tussock play run          (a window)"
 	@echo "    $(BIN)/tussock play run --web    (a browser, where there is no display)"
 
-test: $(VENV)/developer  ## all tests, on all cores
+test: $(VENV)/developer  ## the quick tests, on all cores
 	$(BIN)/pytest -n auto --dist loadfile
+
+test-slow: $(VENV)/developer  ## the tests that take long: killed processes, full disks, whole studies, browsers
+	$(BIN)/pytest -n auto -m slow
 
 lint: $(VENV)/developer  ## style, types, and which room may know which
 	$(BIN)/ruff check .
