@@ -158,8 +158,9 @@ def training_key(experiment: Experiment) -> str:
 
 
 def degrees(angle: float) -> float:
-    """An angle (rad) in degrees, without the rounding of the way there and back."""
-    return round(math.degrees(angle), 9)
+    """An angle (rad) in degrees: the number that was given, where it was given in degrees."""
+    short = round(math.degrees(angle), 9)
+    return short if math.radians(short) == angle else math.degrees(angle)
 
 
 def describe_encoding(encoding: "Encoding", eye: Eye) -> tuple[str, float | None, float]:
