@@ -92,15 +92,18 @@ class Diagnosis:
 class Diagnostics:
     """Measures why the steps of a walk are poor."""
 
-    def __init__(self, renderer: Renderer, trained: TrainedModel, route: Route):
+    def __init__(self, renderer: Renderer, trained: TrainedModel | None, route: Route):
         """Prepare for walks along a route.
 
         Args:
             renderer: The one that the walk uses.
-            trained: What the walk follows. Where the poses of its views are unknown, nothing about learned views is measured.
+            trained: What the walk follows; None where the navigator has no model. Where it, or the poses of its views, are unknown,
+                nothing about learned views is measured.
             route: The route that the walk is to follow.
         """
-        self._renderer, self._trained, self._route = renderer, trained, route
+        self._renderer, self._route = renderer, route
+        self._poses = None if trained is None else trained.poses
+        self._encoding = None if trained is None else trained.encoding
 
     def examine(self, step: Step) -> Diagnosis | None:
         """What is measured at a poor or failed step; None for a good one, which costs nothing.
@@ -123,19 +126,19 @@ class Diagnostics:
         return float(wrap_angle(step.pose.heading + step.turn - np.arctan2(y - step.pose.y, x - step.pose.x)))
 
     def _nearest(self, pose: Pose) -> float | None:
-        if self._trained.poses is None:
+        if self._poses is None:
             return None
-        return float(np.hypot(*(self._trained.poses[:, :2] - pose[:2]).T).min())
+        return float(np.hypot(*(self._poses[:, :2] - pose[:2]).T).min())
 
     def _recognised(self, step: Step) -> float | None:
-        if self._trained.poses is None or self._trained.encoding is None:
+        if self._poses is None or self._encoding is None:
             return None
-        poses, match = self._trained.poses, step.match
+        poses, match = self._poses, step.match
         if match is None:  # the model keeps no views: take the learned view that looks most like this one
             if step.view is None:
                 return None
             memory, poses = self._memory
-            _, index = memory.match(self._trained.encoding(step.view[None]))
+            _, index = memory.match(self._encoding(step.view[None]))
             width = index.shape[1]
             match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
         return float(np.hypot(*(poses[match, :2] - step.pose[:2])))
@@ -143,9 +146,9 @@ class Diagnostics:
     @cached_property
     def _memory(self) -> tuple[PerfectMemory, Float[np.ndarray, "m 3"]]:
         """A memory of all learned views, and their poses."""
-        assert self._trained.encoding is not None
-        assert self._trained.poses is not None
-        views, poses = training_views(self._trained.encoding, self._renderer, self._trained.poses)
+        assert self._encoding is not None
+        assert self._poses is not None
+        views, poses = training_views(self._encoding, self._renderer, self._poses)
         return PerfectMemory().fit(views), poses
 
 
