@@ -135,7 +135,7 @@ def run_command(experiment: Experiment, out: str) -> str:
         if value is not None and value != defaults[name]:
             flag = f"--{name.replace('_', '-')}"
             words += [flag] if value is True else [flag, str(value)]
-    return f"tussock run {shlex.join(words)} --out {shlex.quote(out)}"
+    return shlex.join(["tussock", "run", *words, "--out", out])
 
 
 def key_of(experiment: Experiment) -> str:
