@@ -1,5 +1,6 @@
 """What all tests share. Shapes and types in signatures are checked while the tests run."""
 
+import os
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -16,11 +17,15 @@ CHECKED = [
 ]  # fmt: skip
 install_import_hook(CHECKED, "typecheck.check")
 
+# Workers of pytest-xdist share the cores: more threads than one each would only wait for one another.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # No test asserts a time, those of hypothesis included.
 settings.register_profile("no deadline", settings(), deadline=None)
 settings.load_profile("no deadline")
 
-# A shell has what it runs in the background ignore Ctrl-C, and so all that the tests start; they are to heed it.
+# A shell lets what it runs in the background ignore Ctrl-C, and so everything that the tests start; here it must not be ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
@@ -30,7 +35,7 @@ SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 def sussex() -> Path:
     """The folder of the original world and routes."""
     if not SUSSEX.is_dir():
-        pytest.skip("the Sussex world is not on this machine (a folder shared/sussex beside the project)")
+        pytest.skip("the Sussex world is not on this machine (a folder shared/sussex next to the project)")
     return SUSSEX
 
 
