@@ -141,7 +141,8 @@ def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
 
 def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
     """The line of a run, from its results by name."""
-    asked = {name: settings_of(experiment)[name] for name in ASKED}
+    settings = settings_of(experiment)
+    asked = {name: settings[name] for name in ASKED}
     names = [each.name for each in attrs.fields(Line) if each.name not in ASKED]
     return Line(**asked, **{name: results.get(name) for name in names} | {"arrived": bool(results.get("arrived"))})
 
@@ -237,7 +238,7 @@ def current_encoding(encoding: str) -> str:
 
 
 def _check_runs(path: Path, result: Result, benchmark: Benchmark) -> None:
-    asked = [tuple(settings_of(run)[name] for name in ASKED) for runs in benchmark.by_world() for run in runs]
+    asked = benchmark.asked()
     if [run.asked for run in result.runs] != asked:
         raise FileError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
 
