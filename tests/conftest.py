@@ -39,6 +39,16 @@ def sussex() -> Path:
     return SUSSEX
 
 
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[str]:
+    """The address of a Dask scheduler with one worker, both in threads of this process."""
+    from distributed import LocalCluster
+
+    free = "127.0.0.1:0"  # of the pages that it serves
+    with LocalCluster(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=free) as local:
+        yield local.scheduler_address
+
+
 @pytest.fixture
 def small_disk(tmp_path) -> Iterator[Path]:
     """A disk of 150 kB."""

@@ -22,7 +22,6 @@ import psutil
 import pytest
 from browser import WIDTHS, in_browser
 from commands import TUSSOCK, printed, process_json, tussock
-from distributed import LocalCluster
 
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_settings import TYPES, experiment_of, key_of, settings_of
@@ -61,13 +60,6 @@ def swept(tmp_path_factory) -> Path:
     result = process_json("sweep", written(folder, SWEEP), "--out", folder / "out", "--record", "worst:1")
     assert (result["runs"], result["done_before"], result["could_not_run"]) == (24, 0, 0)
     return folder / "out"
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[str]:
-    """The address of a Dask scheduler with a worker, both in threads of this process."""
-    with LocalCluster(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as local:
-        yield local.scheduler_address
 
 
 # Runs and their table
