@@ -44,8 +44,9 @@ def cluster() -> Iterator[str]:
     """The address of a Dask scheduler with one worker, both in threads of this process."""
     from distributed import LocalCluster
 
-    free = "127.0.0.1:0"  # of the pages that it serves
-    with LocalCluster(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=free) as local:
+    free = "127.0.0.1:0"  # of the pages that they serve
+    pages = {"dashboard_address": free, "worker_dashboard_address": free}
+    with LocalCluster(processes=False, n_workers=1, threads_per_worker=1, **pages) as local:
         yield local.scheduler_address
 
 
