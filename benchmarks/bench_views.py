@@ -6,7 +6,7 @@ import pytest
 import worlds
 
 from tussock.render import Eye, open_renderer
-from tussock.render.images.writing import Grid, published_part, write_database
+from tussock.render.images.writing import Grid, published_grid_area, write_database
 from tussock.world import InputError
 
 SHAPES = [(720, 150, 1), (90, 25, 4), (90, 25, 1), (120, 25, 4)]
@@ -58,7 +58,7 @@ def test_view_by_opengl(measure):
 
 def test_the_published_grid_as_a_database(measure, tmp_path):
     name, world = worlds.everyday()
-    grid = Grid.over(published_part(world.field), 0.2)
+    grid = Grid.over(published_grid_area(world.field), 0.2)
     with open_renderer(world, Eye(), "cpu") as renderer:
         measure(
             f"{len(grid.poses()):,} views of 720 x 150, {name}, drawn and written as a PNG database",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tussock.render.renderer import Renderer
+from tussock.world.errors import SettingError
 from tussock.world.geometry import Pose, Route
 
 from .body import Body
@@ -51,6 +52,8 @@ class Agent:
 
     def walk_many(self, starts: Sequence[Pose]) -> Iterator[list[Step | None]]:
         """Walk from each start, side by side: see `Walk.steps`. Walk k draws its noise from `seed` + k."""
+        if self.trained.encoding is None:
+            raise SettingError("the encoding of what the model learned is not known; give TrainedModel its encoding")
         walk = Walk(
             renderer=self.renderer,
             encoding=self.trained.encoding,

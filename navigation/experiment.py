@@ -20,7 +20,7 @@ import attrs
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
 from tussock.world.progress import Progress, no_progress
-from tussock.world.settings import instance_of, number, settings
+from tussock.world.settings import converted, instance_of, number, settings
 from tussock.world.specs import Spec
 
 from .body import Body
@@ -45,7 +45,7 @@ MODEL_SUFFIX = ".safetensors"  # of files of trained models
 FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
 
 
-def _encoding(value: Any, experiment: "Experiment") -> Any:
+def _encoding(value: Any, experiment: Any = None) -> Any:
     """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
     from .encoding import PRESETS, Encoding
 
@@ -93,9 +93,9 @@ class Experiment(Surroundings):
         device: Where the model learns and scans: "cpu", "cuda", or another device of torch.
     """
 
-    encoding: "Encoding" = attrs.field(default="edges", converter=attrs.Converter(_encoding, takes_self=True))
-    navigator: Spec = attrs.field(default="scan", converter=_navigator)
-    model: Spec | Path = attrs.field(default="perfect-memory", converter=_model)
+    encoding: "Encoding" = converted(default="edges", converter=_encoding, takes_self=True)
+    navigator: Spec = converted(default="scan", converter=_navigator)
+    model: Spec | Path = converted(default="perfect-memory", converter=_model)
     training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
     start_offset: float = number(0.0, unit="m")

@@ -288,7 +288,7 @@ def _content(source: Any) -> str:
     if not isinstance(source, str | Path):
         import joblib
 
-        return joblib.hash(source)
+        return str(joblib.hash(source))
     status = Path(source).stat()
     return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
 

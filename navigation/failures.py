@@ -13,6 +13,7 @@ from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
 from tussock.world.geometry import Pose, Route, columns_of_turn, wrap_angle
 
+from .encoding import Encoding
 from .evaluation import RECOVERED_DEG
 from .models.files import TrainedModel
 from .models.perfect_memory import PerfectMemory
@@ -97,13 +98,14 @@ class Diagnostics:
 
         Args:
             renderer: The one that the walk uses.
-            trained: What the walk follows; None where the navigator has no model. Where it, or the poses of its views, are unknown,
-                nothing about learned views is measured.
+            trained: What the walk follows. Where it is None, or the poses of its views are unknown, nothing about learned views is
+                measured.
             route: The route that the walk is to follow.
         """
         self._renderer, self._route = renderer, route
-        self._poses = None if trained is None else trained.poses
-        self._encoding = None if trained is None else trained.encoding
+        self._learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None
+        if trained is not None and trained.poses is not None and trained.encoding is not None:
+            self._learned = trained.encoding, trained.poses
 
     def examine(self, step: Step) -> Diagnosis | None:
         """What is measured at a poor or failed step; None for a good one, which costs nothing.
@@ -126,19 +128,20 @@ class Diagnostics:
         return float(wrap_angle(step.pose.heading + step.turn - np.arctan2(y - step.pose.y, x - step.pose.x)))
 
     def _nearest(self, pose: Pose) -> float | None:
-        if self._poses is None:
+        if self._learned is None:
             return None
-        return float(np.hypot(*(self._poses[:, :2] - pose[:2]).T).min())
+        _, poses = self._learned
+        return float(np.hypot(*(poses[:, :2] - pose[:2]).T).min())
 
     def _recognised(self, step: Step) -> float | None:
-        if self._poses is None or self._encoding is None:
+        if self._learned is None:
             return None
-        poses, match = self._poses, step.match
+        (encoding, poses), match = self._learned, step.match
         if match is None:  # the model keeps no views: take the learned view that looks most like this one
             if step.view is None:
                 return None
             memory, poses = self._memory
-            _, index = memory.match(self._encoding(step.view[None]))
+            _, index = memory.match(encoding(step.view[None]))
             width = index.shape[1]
             match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
         return float(np.hypot(*(poses[match, :2] - step.pose[:2])))
@@ -146,9 +149,9 @@ class Diagnostics:
     @cached_property
     def _memory(self) -> tuple[PerfectMemory, Float[np.ndarray, "m 3"]]:
         """A memory of all learned views, and their poses."""
-        assert self._encoding is not None
-        assert self._poses is not None
-        views, poses = training_views(self._encoding, self._renderer, self._poses)
+        assert self._learned is not None
+        encoding, poses = self._learned
+        views, poses = training_views(encoding, self._renderer, poses)
         return PerfectMemory().fit(views), poses
 
 

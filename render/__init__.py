@@ -2,5 +2,5 @@
 
 import lazy_loader
 
-# The names and where they are stand in __init__.pyi; each is loaded when it is first used.
+# The names are listed in __init__.pyi; each is loaded when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,8 +1,8 @@
-"""The OpenGL context, through EGL or OSMesa. Nothing else in the project touches PYOPENGL_PLATFORM.
+"""The OpenGL context, by EGL or OSMesa. Nothing else in the project uses PYOPENGL_PLATFORM.
 
-PyOpenGL binds every function to one platform when it is first imported, so a process has EGL or OSMesa, never both. It
-has one context, which all its renderers share and which lasts as long as it does: EGL has one connection to a device,
-and a renderer that closed it (as pyrender's own do) would take the others' contexts with it.
+PyOpenGL binds all functions to one platform when it is first imported, so a process has EGL or OSMesa, never both. It has one
+context, which all its renderers share, and which is never closed: EGL has one connection to a device, and a renderer that closes it
+(as pyrender's own do) destroys the contexts of the others.
 """
 
 import ctypes
@@ -16,21 +16,29 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from tussock.world.errors import InputError
+from tussock.world.errors import MissingDependencyError, SettingError
 
-# What must load (any one name of each group), and the Debian packages it is in.
-_NEEDS = {
+# Libraries that must load (any one of each group), and the Debian packages that contain them.
+_LIBRARIES = {
     "egl": ((("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1")), "libegl1 libgl1 libgl1-mesa-dri"),
     "osmesa": ((("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),), "libosmesa6"),
 }
-_BOUND_AS = {"EGLPlatform": "egl", "OSMesaPlatform": "osmesa", "GLXPlatform": "glx"}
+_PLATFORMS = {"EGLPlatform": "egl", "OSMesaPlatform": "osmesa", "GLXPlatform": "glx"}
 
 _opening = threading.Lock()
+# One for the process, as PyOpenGL's platform is. It is opened by `open_context` only.
 _context: "Context | None" = None
 
 
 class Context:
-    """The process's OpenGL context. `with context:` makes it current, one thread at a time."""
+    """The OpenGL context of the process. `with context:` makes it current, in one thread at a time.
+
+    Args:
+        backend: "egl" or "osmesa".
+
+    Raises:
+        MissingDependencyError: The driver is missing or too old.
+    """
 
     def __init__(self, backend: str):
         self.backend = backend
@@ -41,9 +49,9 @@ class Context:
 
         with self:
             if not glClipControl:
-                raise InputError(
-                    f"the {backend} renderer needs OpenGL 4.5 or GL_ARB_clip_control, which this driver lacks; "
-                    f"update the driver or take the cpu renderer"
+                raise MissingDependencyError(
+                    f"the {backend} renderer needs OpenGL 4.5 or GL_ARB_clip_control, which this driver does not have; "
+                    f"update the driver or use the cpu renderer"
                 )
 
     def __enter__(self) -> "Context":
@@ -51,7 +59,7 @@ class Context:
         try:
             if self._depth == 0:
                 self._make_current()
-        except BaseException:  # whatever it was, also Ctrl-C: the others must not wait for ever
+        except BaseException:  # also Ctrl-C: other threads must not wait for ever
             self._lock.release()
             raise
         self._depth += 1
@@ -65,16 +73,21 @@ class Context:
 
 
 def open_context(backend: str) -> Context:
-    """The process's context, opened at the first call. backend: "egl" or "osmesa".
+    """The context of the process, which the first call opens.
 
-    Raises InputError where the process is bound to the other one, or a library or driver is missing.
+    Args:
+        backend: "egl" or "osmesa".
+
+    Raises:
+        SettingError: The process is bound to the other backend.
+        MissingDependencyError: A library or driver is missing.
     """
     global _context
     with _opening:
         if bound_backend() not in (None, backend):
-            raise InputError(
+            raise SettingError(
                 f"the {backend} renderer cannot be opened: this process already uses OpenGL through {bound_backend()}, "
-                f"and PyOpenGL takes one of them a process; open it in another process"
+                f"and PyOpenGL has one of them in each process; open it in another process"
             )
         if _context is None:
             _check_libraries(backend)
@@ -84,18 +97,16 @@ def open_context(backend: str) -> Context:
 
 
 def bound_backend() -> str | None:
-    """Which platform PyOpenGL is bound to in this process ("egl", "osmesa", "glx"...), None while it is free."""
+    """The platform that PyOpenGL is bound to in this process ("egl", "osmesa", "glx", ...); None if it is not loaded yet."""
     loaded = sys.modules.get("OpenGL.platform")
     platform = type(getattr(loaded, "PLATFORM", None)).__name__
-    return None if loaded is None else _BOUND_AS.get(platform, platform)
+    return None if loaded is None else _PLATFORMS.get(platform, platform)
 
 
 def gl_device_name() -> str:
-    """What draws, as OpenGL calls it (GL_RENDERER). Raises InputError before any GL renderer was opened."""
+    """What OpenGL draws with (GL_RENDERER). Raises SettingError if no OpenGL renderer was opened in this process."""
     if _context is None:
-        raise InputError(
-            "no OpenGL renderer has been opened in this process; open one before asking what it draws with"
-        )
+        raise SettingError("no OpenGL renderer was opened in this process; open one first")
     from OpenGL import GL
 
     with _context:
@@ -104,16 +115,24 @@ def gl_device_name() -> str:
 
 
 class Framebuffer:
-    """A picture to draw into: RGBA bytes, one sample a pixel, and a float depth. Needs the context current."""
+    """An image to draw into: RGBA bytes, one sample for each pixel, and a float depth. The context must be current.
+
+    Args:
+        width: Pixels.
+        height: Pixels.
+
+    Raises:
+        SettingError: OpenGL has no images of this size here.
+    """
 
     def __init__(self, width: int, height: int):
         from OpenGL import GL
 
         limit = int(GL.glGetIntegerv(GL.GL_MAX_RENDERBUFFER_SIZE))
         if max(width, height) > limit:
-            raise InputError(
-                f"cube faces of {width} pixels make a picture of {width} x {height}, and this OpenGL draws {limit} at "
-                f"most; take an eye with fewer pixels, a smaller face_size, or the cpu renderer"
+            raise SettingError(
+                f"cube faces of {width} pixels need an image of {width} x {height}, and this OpenGL draws at most {limit}; "
+                f"use an eye with fewer pixels, a smaller face_size, or the cpu renderer"
             )
         self.width, self.height = width, height
         self._id = GL.glGenFramebuffers(1)
@@ -125,8 +144,8 @@ class Framebuffer:
             GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, kind, width, height)
             GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, attachment, GL.GL_RENDERBUFFER, buffer)
 
-    def aim(self, size: int, bottom: int, rows: int, offset: int) -> None:
-        """Place the next picture, size x size: its `rows` rows from `bottom` land at row `offset`, the rest is cut."""
+    def select(self, size: int, bottom: int, rows: int, offset: int) -> None:
+        """Choose where the next image (size x size) goes: its `rows` rows from `bottom` to row `offset`; the others are cut."""
         from OpenGL import GL
         from OpenGL.GL.ARB.clip_control import glClipControl
 
@@ -134,7 +153,7 @@ class Framebuffer:
         GL.glViewport(0, offset - bottom, size, size)
         GL.glEnable(GL.GL_SCISSOR_TEST)
         GL.glScissor(0, offset, size, rows)
-        # Depth runs from 1 near to 0 at infinity: floats are densest at 0, which keeps far things apart.
+        # Depth goes from 1 near to 0 at infinity: floats are densest at 0, which keeps far surfaces apart.
         glClipControl(GL.GL_LOWER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glEnable(GL.GL_DEPTH_TEST)
         GL.glDepthMask(GL.GL_TRUE)
@@ -143,14 +162,14 @@ class Framebuffer:
         GL.glDisable(GL.GL_DITHER)
 
     def read(self, out: UInt8[np.ndarray, "height width 4"]) -> None:
-        """Copy the picture into `out`, bottom row first."""
+        """Copy the image into `out`, bottom row first."""
         from OpenGL import GL
 
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._id)
         GL.glReadPixels(0, 0, self.width, self.height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, array=out)
 
     def delete(self) -> None:
-        """Free it."""
+        """Free its memory."""
         from OpenGL import GL
 
         GL.glDeleteFramebuffers(1, [self._id])
@@ -158,12 +177,12 @@ class Framebuffer:
 
 
 def _check_libraries(backend: str) -> None:
-    """Load what the backend needs, before PyOpenGL fails on it in its own way."""
-    groups, packages = _NEEDS[backend]
+    """Load the libraries of a backend. Raises MissingDependencyError with what to install."""
+    groups, packages = _LIBRARIES[backend]
     for names in groups:
         if not any(_loads(name) for name in names):
-            raise InputError(
-                f"the {backend} renderer needs {names[0]}, which this machine lacks; Debian: apt install {packages}"
+            raise MissingDependencyError(
+                f"the {backend} renderer needs {names[0]}, which is not on this machine; Debian: apt install {packages}"
             )
 
 
@@ -176,7 +195,7 @@ def _loads(name: str) -> bool:
 
 
 def _bind(backend: str) -> None:
-    """Import PyOpenGL for a backend; the environment is left as it was."""
+    """Import PyOpenGL for a backend, without changing the environment."""
     before = os.environ.get("PYOPENGL_PLATFORM")
     os.environ["PYOPENGL_PLATFORM"] = backend
     try:
@@ -188,7 +207,7 @@ def _bind(backend: str) -> None:
 
 
 def _egl_context() -> tuple[Any, Any]:
-    """An OpenGL context without a surface on the first EGL device that has one; as (make current, release)."""
+    """An OpenGL context without a surface, on the first EGL device that allows it, as functions (make current, release)."""
     from OpenGL import EGL
     from OpenGL.error import Error
 
@@ -202,11 +221,11 @@ def _egl_context() -> tuple[Any, Any]:
             context = _egl_context_on(display)
             make_current(display, context)
             return partial(make_current, display, context), partial(make_current, display, EGL.EGL_NO_CONTEXT)
-        except Error:  # another user's device, or a display adapter that draws nothing: the next one may do
+        except Error:  # a device of another user, or one that cannot draw: the next one may work
             continue
-    raise InputError(
-        f"the egl renderer needs a device that draws OpenGL 3.3; none of the {len(displays)} here does; install the "
-        f"GPU's driver or, without a GPU, Mesa (Debian: apt install {_NEEDS['egl'][1]})"
+    raise MissingDependencyError(
+        f"the egl renderer needs a device with OpenGL 3.3, and none of the {len(displays)} devices here has it; install the "
+        f"GPU's driver or, without a GPU, Mesa (Debian: apt install {_LIBRARIES['egl'][1]})"
     )
 
 
@@ -244,11 +263,11 @@ def _egl_context_on(display: Any) -> Any:
 
 
 def _osmesa_context() -> tuple[Any, Any]:
-    """An OSMesa context; as (make current, release)."""
+    """An OSMesa context, as functions (make current, release)."""
     from OpenGL import GL, osmesa, platform
 
-    # PyOpenGL wraps the current context in a new object each time it is asked. pyrender takes that for another context,
-    # compiles its shaders anew for every picture and keeps them all; a plain address is equal to itself.
+    # PyOpenGL returns the current context as a new object each time. pyrender takes it for another context, so it compiles its
+    # shaders for every image and keeps them all. A plain address is equal to itself.
     platform.PLATFORM.GetCurrentContext.restype = ctypes.c_void_p  # type: ignore[attr-defined]
 
     pairs = (
@@ -259,8 +278,10 @@ def _osmesa_context() -> tuple[Any, Any]:
     )
     context = osmesa.OSMesaCreateContextAttribs(np.array([*sum(pairs, ()), 0], dtype=np.int32), None)
     if not context:
-        raise InputError("this OSMesa draws no OpenGL 3.3; install Mesa 17 or newer (Debian: apt install libosmesa6)")
-    unused = (ctypes.c_ubyte * 4)()  # OSMesa wants a picture of its own; Framebuffer draws into another
+        raise MissingDependencyError(
+            "this OSMesa does not have OpenGL 3.3; install Mesa 17 or newer (Debian: apt install libosmesa6)"
+        )
+    unused = (ctypes.c_ubyte * 4)()  # OSMesa needs an image of its own; Framebuffer draws into another
     return (
         lambda: osmesa.OSMesaMakeCurrent(context, unused, GL.GL_UNSIGNED_BYTE, 1, 1),
         lambda: osmesa.OSMesaMakeCurrent(None, None, GL.GL_UNSIGNED_BYTE, 0, 0),

@@ -1,6 +1,4 @@
-"""How much of what an eye sees is very near to it."""
-
-import dataclasses
+"""How much of what an eye sees is very close to it."""
 
 import numpy as np
 
@@ -9,33 +7,38 @@ from tussock.world.scene import World
 
 from .eye import Eye
 
-APART = np.radians(5.0)  # between rays
+RAY_SPACING = np.radians(5.0)  # rad
 
 
 def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float:
-    """Share of a panorama (0 to 1) in which a triangle of the world, the ground not among them, is nearer than `distance` (m).
+    """Share of a panorama in which something is closer than a distance; the ground does not count.
 
-    Rays of the eye's elevations, APART from each other and the same for every heading: what counts is where surfaces are, not
-    how they are cut into triangles. Nearness is that of the scanlines (render/scanline.py): a ray d meets the triangle
-    (a, b, c) where it passes its three edges on one side, at D / (N . d).
+    It casts rays RAY_SPACING apart, the same for every heading, and tests them as render/scanline.py does: a ray d meets the
+    triangle (a, b, c) where it passes all three edges on one side, at the distance D / (N . d). So the result depends on where
+    surfaces are, not on how they are split into triangles.
+
+    Args:
+        world: The world.
+        eye: Its elevations and height are used.
+        pose: Where the eye is.
+        distance: The distance (m).
+
+    Returns:
+        The share, 0 to 1.
     """
-    rows = max(1, round((eye.top - eye.bottom) / APART))
-    elevations = dataclasses.replace(eye, height=rows).elevations()[:, None]
-    azimuths = column_azimuths(round(2 * np.pi / APART))
+    rows = max(1, round((eye.top - eye.bottom) / RAY_SPACING))
+    elevations = Eye(height=rows, top=eye.top, bottom=eye.bottom).elevations()[:, None]
+    azimuths = column_azimuths(round(2 * np.pi / RAY_SPACING))
     up = np.broadcast_to(np.sin(elevations), (rows, len(azimuths)))
     rays = np.stack([np.cos(elevations) * np.cos(azimuths), np.cos(elevations) * np.sin(azimuths), up]).reshape(3, -1).T
-    at = np.array([pose.x, pose.y, eye.z])
-    near = np.flatnonzero(
-        (world.triangles.min(axis=1) < at + distance).all(axis=1)
-        & (world.triangles.max(axis=1) > at - distance).all(axis=1)
-    )
-    a, b, c = (world.triangles[near].astype(float) - at).transpose(1, 0, 2)
+    position = np.array([pose.x, pose.y, eye.z])
+    close = (world.triangles.min(axis=1) < position + distance) & (world.triangles.max(axis=1) > position - distance)
+    a, b, c = (world.triangles[close.all(axis=1)].astype(float) - position).transpose(1, 0, 2)
     volume = (a * np.cross(b, c)).sum(axis=1)
-    seen = volume != 0 if world.double_sided else volume < 0
-    a, b, c, volume = a[seen], b[seen], c[seen], volume[seen]
+    visible = volume != 0 if world.double_sided else volume < 0
+    a, b, c, volume = a[visible], b[visible], c[visible], volume[visible]
     inside = np.ones((len(rays), len(volume)), dtype=bool)
-    for one, other in ((a, b), (b, c), (c, a)):
-        inside &= rays @ np.cross(one, other).T * volume >= 0
-    # The nearness of what is behind is negative.
-    nearness = rays @ (np.cross(b - a, c - a) / volume[:, None]).T
-    return float((inside & (nearness > 1 / distance)).any(axis=1).mean())
+    for start, end in ((a, b), (b, c), (c, a)):
+        inside &= rays @ np.cross(start, end).T * volume >= 0
+    inverse_distance = rays @ (np.cross(b - a, c - a) / volume[:, None]).T  # negative behind the eye
+    return float((inside & (inverse_distance > 1 / distance)).any(axis=1).mean())

@@ -1,44 +1,48 @@
-"""Panoramas drawn by OpenGL, on a GPU or by Mesa: the faces of a cube through pyrender, then unwrapped (cubemap.py).
+"""Panoramas by OpenGL, on a GPU or by Mesa: pyrender draws the faces of a cube, and cubemap.py makes panoramas of them.
 
-pyrender uploads the world once and draws it, textures included. It draws into a picture of ours, for its own takes four
-samples a pixel, whose mixtures on edges no exact renderer has, and is always read back with its depth; and with a
-reversed depth, which keeps far things apart however near the near plane is (gl.Framebuffer, Camera).
+pyrender uploads the world once and draws it, textures included. It draws into a framebuffer of ours: its own takes four samples for
+each pixel, which mixes colours on edges as no exact renderer does, and always reads the depth back. The depth is reversed, which
+keeps far surfaces apart whatever the near plane is (gl.Framebuffer, Camera).
 
-This is the only module that imports pyrender, and does so late: the import binds PyOpenGL to a platform for good.
+Only this module imports pyrender, and only when a renderer is opened: the import binds PyOpenGL to one platform for good.
 """
 
 import weakref
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tussock.world.errors import InputError
+from tussock.world.errors import InputError, SettingError
 from tussock.world.mesh_materials import face_rgb, texture_factor, texture_of
 from tussock.world.scene import World
 
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
 from .gl import Context, Framebuffer, open_context
-from .renderer import Poses, as_poses
+from .poses import Poses, Views, as_poses
 
-NEAR = 1e-4  # m; what is nearer to the eye is not seen. Nothing is too far.
+NEAR = 1e-4  # m; surfaces closer to the eye are not drawn. There is no far limit.
 
 
 class RasterRenderer:
-    """Panoramas through OpenGL (see the module's docstring); a `Renderer`.
+    """Panoramas by OpenGL, a `Renderer`.
 
-    backend: "egl" or "osmesa". face_size: edge of a cube face in pixels; None takes what the eye needs.
-    A texture is drawn in its colours, its alpha ignored: a leaf cut out of a rectangle by alpha shows the rectangle.
-    Raises InputError where the backend cannot be had.
+    Textures are drawn in their colours, without their alpha: a leaf cut out of a rectangle by alpha shows the rectangle.
+
+    Args:
+        world: The world.
+        eye: The eye.
+        backend: "egl" or "osmesa".
+        face_size: Edge of a cube face (pixels); None is what the eye needs.
+
+    Raises:
+        InputError: The backend is not available here, or the faces are too large for it.
     """
 
     def __init__(self, world: World, eye: Eye, backend: str, face_size: int | None = None):
         if face_size is not None and face_size < 1:
-            raise InputError(
-                f"cube faces of {face_size} pixels cannot be drawn; give at least 1, or None for what the eye needs"
-            )
+            raise SettingError(f"cube faces of {face_size} pixels cannot be drawn; give at least 1, or None")
         self.world, self.eye, self.backend, self._face_size = world, eye, backend, face_size
         self._cubemap = Cubemap(eye, face_size or face_size_for(eye))
         self._context = open_context(backend)
@@ -47,17 +51,17 @@ class RasterRenderer:
         self._flags = pyrender.RenderFlags.FLAT
         self._scene, self._camera = _scene(world)
         with self._context:
-            self._picture = Framebuffer(self._cubemap.size, self._cubemap.rows)
-            self._painter = pyrender.Renderer(self._cubemap.size, self._cubemap.size)
+            self._framebuffer = Framebuffer(self._cubemap.size, self._cubemap.rows)
+            self._pyrender = pyrender.Renderer(self._cubemap.size, self._cubemap.size)
         self._atlas = np.empty((self._cubemap.rows, self._cubemap.size, 4), dtype=np.uint8)
-        # Runs at close, when the renderer is dropped, or at exit; pyrender's own clean-up would find no context then.
-        self._free = weakref.finalize(self, _free, self._context, self._painter, self._picture)
+        # Runs when the renderer is closed, deleted, or at exit, while the context exists; pyrender's own clean-up comes too late.
+        self._free = weakref.finalize(self, _free, self._context, self._pyrender, self._framebuffer)
 
     def __reduce__(self):
-        """Sent to another process, it is opened anew there."""
+        """In another process it is opened anew."""
         return RasterRenderer, (self.world, self.eye, self.backend, self._face_size)
 
-    def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width 4"]:
+    def render(self, poses: Poses) -> Views:
         """See `Renderer.render`. Threads may share a renderer; they take turns."""
         if not self._free.alive:
             raise InputError("this renderer is closed; open another one")
@@ -67,41 +71,41 @@ class RasterRenderer:
             for pose, view in zip(poses, views, strict=True):
                 for face in self._cubemap.faces:
                     self._draw(face, pose)
-                self._picture.read(self._atlas)
+                self._framebuffer.read(self._atlas)
                 view[:] = self._cubemap.unwrap(self._atlas)
         return views
 
     def _draw(self, face: Face, pose: Float[np.ndarray, " 3"]) -> None:
-        """Draw one face of the cube around the eye at a pose into its place in the atlas."""
+        """Draw one face of the cube around the eye at a pose into its rows of the atlas."""
         x, y, heading = pose
         c, s = np.cos(heading), np.sin(heading)
         right, up, forward = face.axes @ np.array([(c, s, 0), (-s, c, 0), (0, 0, 1)])
         camera = np.eye(4)
         camera[:3] = np.column_stack([right, up, -forward, (x, y, self.eye.z)])
         self._scene.set_pose(self._camera, camera)
-        picture, size = self._picture, self._cubemap.size
+        framebuffer, size = self._framebuffer, self._cubemap.size
 
-        def aim(flags: int) -> None:
-            picture.aim(size, face.bottom, face.rows, face.offset)
+        def select(flags: int) -> None:
+            framebuffer.select(size, face.bottom, face.rows, face.offset)
 
-        self._painter._configure_forward_pass_viewport = aim  # pyrender calls this to choose where it draws
-        self._painter.render(self._scene, self._flags)
+        self._pyrender._configure_forward_pass_viewport = select  # pyrender calls this to choose where it draws
+        self._pyrender.render(self._scene, self._flags)
 
     def close(self) -> None:
-        """Free what the renderer holds in the GL; closing twice does nothing."""
+        """Free what the renderer holds in OpenGL; closing twice does nothing."""
         self._free()
 
     def __enter__(self) -> "RasterRenderer":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, kind, error, traceback) -> None:
         self.close()
 
 
-def _free(context: Context, painter: Any, picture: Framebuffer) -> None:
+def _free(context: Context, renderer: Any, framebuffer: Framebuffer) -> None:
     with context:
-        painter.delete()
-        picture.delete()
+        renderer.delete()
+        framebuffer.delete()
 
 
 def _scene(world: World) -> tuple[Any, Any]:
@@ -109,7 +113,7 @@ def _scene(world: World) -> tuple[Any, Any]:
     import pyrender
 
     class Camera(pyrender.Camera):
-        """Sees 90 degrees, without a far plane, its depth from 1 near to 0 at infinity."""
+        """Shows 90 degrees, without a far plane, with a depth from 1 near to 0 at infinity."""
 
         def get_projection_matrix(self, width=None, height=None):
             return np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, NEAR), (0, 0, -1, 0)], dtype=float)
@@ -117,7 +121,7 @@ def _scene(world: World) -> tuple[Any, Any]:
     scene = pyrender.Scene(bg_color=[*(c / 255 for c in world.sky_rgb), 0.0])
     primitives = [_textured(mesh, world.double_sided) for mesh in world.textured]
     triangles, rgb = world.surfaces()
-    if world.textured:  # they are the world's triangles: only the ground comes without a texture
+    if world.textured:  # these meshes are all triangles of the world, so only the ground remains
         triangles, rgb = triangles[len(world.triangles) :], rgb[len(world.triangles) :]
     if len(triangles):
         primitives.append(_coloured(triangles, rgb, world.double_sided))
@@ -129,7 +133,7 @@ def _scene(world: World) -> tuple[Any, Any]:
 
 
 def _coloured(triangles: Float[np.ndarray, "n 3 3"], rgb: UInt8[np.ndarray, "n 3"], double_sided: bool) -> Any:
-    """Triangles of one colour each, as pyrender draws them."""
+    """A pyrender primitive of triangles that have one colour each."""
     import pyrender
 
     return pyrender.Primitive(
@@ -140,14 +144,14 @@ def _coloured(triangles: Float[np.ndarray, "n 3 3"], rgb: UInt8[np.ndarray, "n 3
 
 
 def _textured(mesh: Any, double_sided: bool) -> Any:
-    """A trimesh mesh with its texture, or with its colours where it has none, as pyrender draws it."""
+    """A pyrender primitive of a trimesh mesh with its texture, or with its colours where it has no texture."""
     import pyrender
 
     image = texture_of(mesh)
     if image is None:
         return _coloured(mesh.triangles, face_rgb(mesh), double_sided)
     texels = np.array(image.convert("RGBA"))
-    texels[..., 3] = 255  # alpha is how much of a pixel is covered, and a textured triangle covers
+    texels[..., 3] = 255  # alpha is the share of a pixel that is covered, and a textured triangle covers it
     return pyrender.Primitive(
         positions=mesh.triangles.reshape(-1, 3),
         texcoord_0=mesh.visual.uv[mesh.faces].reshape(-1, 2),

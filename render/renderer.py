@@ -1,20 +1,12 @@
-"""What a renderer is, and how to open one."""
+"""The interface of the renderers, and how to open one."""
 
-from collections.abc import Sequence
-from types import TracebackType
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-from jaxtyping import Float, UInt8
-
-from tussock.world.errors import InputError
-from tussock.world.geometry import FARTHEST, Pose
+from tussock.world.errors import SettingError
 from tussock.world.scene import World
 
 from .eye import Eye
-
-Poses = Float[np.ndarray, "n 3"] | Sequence[Pose | Sequence[float] | Float[np.ndarray, "3"]]
-Views = UInt8[np.ndarray, "n height width 4"]
+from .poses import Poses, Views
 
 BACKENDS = ("auto", "cpu", "egl", "osmesa")
 
@@ -23,7 +15,10 @@ BACKENDS = ("auto", "cpu", "egl", "osmesa")
 class Renderer(Protocol):
     """Draws panoramas of one world through one eye.
 
-    backend: what draws: "cpu", "egl" or "osmesa".
+    Attributes:
+        world: The world.
+        eye: The eye.
+        backend: Name of the renderer: "cpu", "egl" or "osmesa".
     """
 
     world: World
@@ -31,36 +26,48 @@ class Renderer(Protocol):
     backend: str
 
     def render(self, poses: Poses) -> Views:
-        """Panoramas at poses (x [m], y [m], heading [rad]); one pose is a batch of one.
+        """Draw the panoramas at some poses.
 
-        Colour is the average over each pixel's solid angle, the sky included; alpha is the share of the pixel
-        that something covers (255: all of it, 0: open sky). Raises InputError for poses that are not finite, or beyond FARTHEST.
+        Args:
+            poses: (n, 3) x (m), y (m) and heading (rad).
+
+        Returns:
+            (n, height, width, 4) red, green, blue and alpha. Colour is the average over the solid angle of a pixel, the sky
+            included. Alpha is the share of the pixel that something covers: 255 all of it, 0 open sky.
+
+        Raises:
+            InputError: A pose is not finite or beyond MAX_COORDINATE, or the renderer is closed.
         """
         ...
 
     def close(self) -> None:
-        """Free what the renderer holds; using it afterwards is an error."""
+        """Free what the renderer holds; it cannot be used afterwards."""
         ...
 
     def __enter__(self) -> "Renderer": ...
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
-    ) -> None: ...
+    def __exit__(self, kind, error, traceback) -> None: ...
 
 
 def open_renderer(
     world: World, eye: Eye | None = None, backend: str = "auto", *, threads: int | None = None
 ) -> Renderer:
-    """Open a renderer; use it in a `with` statement.
+    """Open a renderer, for a `with` statement.
 
-    backend: "cpu" (the exact scanline renderer), "egl" or "osmesa" (pyrender), or "auto": the fastest one here, which is
-        the CPU renderer on every machine measured so far (CHANGELOG.md). `Renderer.backend` says which it took.
-    threads: of the CPU renderer; None takes every core this process may run on. OpenGL decides for itself.
-    Raises InputError when an explicit choice cannot be had, naming what to install.
+    Args:
+        world: The world.
+        eye: The eye; None is the default `Eye`.
+        backend: "cpu" (exact), "egl" or "osmesa" (OpenGL through pyrender), or "auto": the fastest. On every machine measured so
+            far (CHANGELOG.md) that is the CPU renderer. `Renderer.backend` is the one chosen.
+        threads: Threads of the CPU renderer; None uses every core that this process may run on. OpenGL decides itself.
+
+    Raises:
+        SettingError: The renderer's name is unknown.
+        MissingDependencyError: A library or driver is missing; the message names what to install.
     """
     check_backend(backend)
     eye = eye or Eye()
+    # Loading numba takes most of a second, and pyrender binds the process to one OpenGL library.
     if backend in ("auto", "cpu"):
         from .scanline import ScanlineRenderer
 
@@ -71,23 +78,6 @@ def open_renderer(
 
 
 def check_backend(backend: str) -> None:
-    """Refuse what is no renderer's name. Raises InputError."""
+    """Refuse a name that is not a renderer's. Raises SettingError."""
     if backend not in BACKENDS:
-        raise InputError(f"unknown renderer {backend!r}; the renderers are {', '.join(BACKENDS)}")
-
-
-def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
-    """Poses as a finite (n, 3) float64 array. Raises InputError otherwise."""
-    try:
-        array = np.asarray(poses, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"poses are rows of x, y, heading, all numbers ({error})") from error
-    if array.size == 0:
-        array = array.reshape(0, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"poses are rows of x, y, heading; got an array of shape {array.shape}")
-    near = np.abs(array) <= FARTHEST  # False for nan, too
-    if not near.all():
-        row = int(near.all(axis=1).argmin())
-        raise InputError(f"pose {row} is {array[row].tolist()}; a pose needs finite numbers up to {FARTHEST:g}")
-    return array
+        raise SettingError(f"unknown renderer {backend!r}; the renderers are {', '.join(BACKENDS)}")

@@ -1,4 +1,4 @@
-"""The triangles of a world sorted in space, under a tree of boxes that lets a renderer leave out many of them at once."""
+"""The triangles of a world, sorted in space under a tree of boxes, so that a renderer can leave out many of them at once."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,16 @@ from jaxtyping import Float, Float32, Int64, UInt64
 
 @dataclass(frozen=True, kw_only=True)
 class TriangleTree:
-    """A binary tree without pointers: box k holds boxes 2 k and 2 k + 1; the box of all is 1, the lowest are the last half.
+    """A binary tree without pointers: box 1 is the box of all, and box k contains boxes 2 k and 2 k + 1.
 
-    Box `len(boxes) // 2 + i` holds the triangles i leaf to (i + 1) leaf - 1. About 47 bytes a triangle.
+    The last half of the boxes are the leaves. Box `len(boxes) // 2 + i` contains the triangles i leaf to (i + 1) leaf - 1. A
+    triangle takes about 47 bytes.
 
-    leaf: triangles in a box of the lowest level.
-    order: place of each triangle in the world it was made of. corners: x, y, z of the three corners (m).
-    boxes: least and greatest x, y, z (m); inf and -inf where a box is empty.
+    Attributes:
+        leaf: Triangles in a leaf.
+        order: Index of each triangle in the world.
+        corners: x, y, z of the three corners of each triangle (m).
+        boxes: Least x, y, z and greatest x, y, z (m); inf and -inf where a box is empty.
     """
 
     leaf: int
@@ -24,8 +27,8 @@ class TriangleTree:
 
     @classmethod
     def of(cls, triangles: Float32[np.ndarray, "n 3 3"], leaf: int) -> "TriangleTree":
-        """The tree of triangles: neighbours along a Z-curve over the ground share a box."""
-        order = np.argsort(_along_z_curve(triangles[:, :, :2].mean(axis=1, dtype=float)), kind="stable")
+        """The tree of some triangles, with `leaf` neighbours along a Z-curve over the ground in each leaf."""
+        order = np.argsort(_z_curve(triangles[:, :, :2].mean(axis=1, dtype=float)), kind="stable")
         corners = np.ascontiguousarray(triangles[order].transpose(2, 1, 0))
         starts = np.arange(0, len(order), leaf)
         leaves = 1 << max(0, len(starts) - 1).bit_length()
@@ -40,8 +43,8 @@ class TriangleTree:
         return cls(leaf=leaf, order=order, corners=corners, boxes=boxes)
 
 
-def _along_z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:
-    """How far along a Z-curve points lie: the bits of x and y, 16 of each, in turn."""
+def _z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:
+    """Position of points along a Z-curve: 16 bits of x and of y, interleaved."""
     if len(points) == 0:
         return np.empty(0, dtype=np.uint64)
     low = points.min(axis=0)

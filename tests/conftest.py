@@ -10,12 +10,7 @@ import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
 
-# All modules but render.scanline: numba compiles functions as they are, not as a type checker wraps them.
-CHECKED = [
-    "tussock.world", "tussock.render.eye", "tussock.render.triangle_tree", "tussock.render.renderer", "tussock.render.cubemap",
-    "tussock.render.raster", "tussock.render.images", "tussock.navigation",
-]  # fmt: skip
-install_import_hook(CHECKED, "typecheck.check")
+install_import_hook(["tussock.world", "tussock.render", "tussock.navigation"], "typecheck.check")
 
 # Workers of pytest-xdist share the cores: more threads than one each would only wait for one another.
 if "PYTEST_XDIST_WORKER" in os.environ:

@@ -1,4 +1,4 @@
-"""Files that people open: whatever is in them, they are read, or refused in one line that names them."""
+"""Files of worlds and routes with any content: each is read, or refused in one line that names it."""
 
 import json
 import struct
@@ -16,25 +16,25 @@ from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
 
-def whole_worlds() -> dict[str, list[bytes]]:
-    """Files of worlds by their endings."""
+def valid_worlds() -> dict[str, list[bytes]]:
+    """Valid files of worlds, by suffix."""
     world = World.generate("tiny", 0)
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.new("RGB", (4, 4), (9, 200, 30)))
+    visual = trimesh.visual.TextureVisuals(uv=corners, material=material)
     square = trimesh.Trimesh(
-        np.column_stack([corners, np.ones(4)]), [[0, 1, 2], [0, 2, 3]], process=False,
-        visual=trimesh.visual.TextureVisuals(uv=corners, material=material),
-    )  # fmt: skip
+        np.column_stack([corners, np.ones(4)]), [[0, 1, 2], [0, 2, 3]], process=False, visual=visual
+    )
     box = trimesh.creation.box()
     for suffix in ("glb", "ply"):
-        write_world(world, FOLDER / f"whole.{suffix}")
+        write_world(world, FOLDER / f"valid.{suffix}")
     antworld = np.concatenate(
         [world.triangles[:9].reshape(9, 9)[:, [0, 3, 6, 1, 4, 7, 2, 5, 8]].T, world.rgb[:9].T / 255]
     )
     return {
-        "glb": [(FOLDER / "whole.glb").read_bytes(), bytes(trimesh.Scene([square, box]).export(file_type="glb"))],
+        "glb": [(FOLDER / "valid.glb").read_bytes(), bytes(trimesh.Scene([square, box]).export(file_type="glb"))],
         "ply": [
-            (FOLDER / "whole.ply").read_bytes(),
+            (FOLDER / "valid.ply").read_bytes(),
             box.export(file_type="ply"),
             box.export(file_type="ply", encoding="ascii"),
         ],
@@ -45,12 +45,12 @@ def whole_worlds() -> dict[str, list[bytes]]:
     }
 
 
-WORLDS = whole_worlds()
+WORLDS = valid_worlds()
 EYE = Eye(width=8, height=3, samples=1)
 
 
-def drawn(path) -> None:
-    """Read a world and draw it, or see it refused."""
+def read_and_draw(path) -> None:
+    """Read a world, draw it and write it again, unless it is refused."""
     world = answer(path, lambda: read_world(path))
     if world is None:
         return
@@ -73,18 +73,18 @@ def world_files(file):
     kind, data = file
     path = FOLDER / f"world.{kind}"
     path.write_bytes(data)
-    drawn(path)
+    read_and_draw(path)
 
 
 def glb_of(tree, rest: bytes) -> bytes:
-    """A GLB of a JSON chunk and what follows it."""
+    """A GLB with a JSON chunk, and the bytes that follow it."""
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
 
 
 def glb_parts(data: bytes):
-    """The JSON chunk of a GLB, and what follows it."""
+    """The JSON chunk of a GLB, and the bytes that follow it."""
     length = struct.unpack("<I", data[12:16])[0]
     return json.loads(data[20 : 20 + length]), data[20 + length :]
 
@@ -98,7 +98,7 @@ COMMENT = json.loads(WORLDS["ply"][0].partition(b"comment tussock ")[2].partitio
 def world_trees(parts):
     path = FOLDER / "tree.glb"
     path.write_bytes(glb_of(*parts))
-    drawn(path)
+    read_and_draw(path)
 
 
 @holds(80)
@@ -112,7 +112,7 @@ def world_metadata(comment, kind):
         tree, rest = glb_parts(WORLDS["glb"][0])
         tree["scenes"][0]["extras"]["tussock"] = comment
         path.write_bytes(glb_of(tree, rest))
-    drawn(path)
+    read_and_draw(path)
 
 
 ROUTES = [
@@ -127,11 +127,13 @@ rows = st.lists(st.tuples(odd_numbers, odd_numbers, odd_numbers), min_size=2, ma
 
 @holds(120)
 @given(
-    damaged(ROUTES) | st.binary(max_size=100) | st.text(max_size=60).map(lambda text: text.encode("utf-8", "surrogatepass"))
+    damaged(ROUTES)
+    | st.binary(max_size=100)
+    | st.text(max_size=60).map(lambda text: text.encode("utf-8", "surrogatepass"))
     | rows.map(lambda rows: ("x_m,y_m,heading_deg\n" + "\n".join(",".join(map(repr, row)) for row in rows)).encode())
     | rows.map(lambda rows: np.array(rows, dtype="<f8").T.tobytes()),
     st.sampled_from(["csv", "bin"]),
-)  # fmt: skip
+)
 def routes(data, kind):
     path = FOLDER / f"route.{kind}"
     path.write_bytes(data)

@@ -5,6 +5,7 @@ import dataclasses
 import io
 import os
 
+import attrs
 import numpy as np
 from fuzzing import FOLDER, VALUES, answer, holds, main
 from hypothesis import example, given
@@ -26,7 +27,7 @@ odd = (
 
 
 @holds(120)
-@given(st.dictionaries(st.sampled_from([field.name for field in dataclasses.fields(Eye)]), odd))
+@given(st.dictionaries(st.sampled_from([field.name for field in attrs.fields(Eye)]), odd))
 def eyes(numbers):
     eye = answer(None, lambda: Eye(**numbers))
     if eye is not None and eye.width * eye.height < 10**6:
@@ -77,12 +78,7 @@ def routes(points, spacing):
 
 
 @holds(120)
-@given(
-    st.dictionaries(
-        st.sampled_from([field.name for field in dataclasses.fields(WorldParams)]) | st.text(max_size=3), VALUES
-    )
-    | VALUES
-)
+@given(st.dictionaries(st.sampled_from(list(WorldParams().to_dict())) | st.text(max_size=3), VALUES) | VALUES)
 def parameters(values):
     params = answer(None, lambda: WorldParams.from_dict(values))
     assert params is None or WorldParams.from_dict(params.to_dict()) == params

@@ -307,20 +307,8 @@ def test_models_lists_each_with_a_sentence_and_its_paper(capfd):
 
 @pytest.mark.slow
 def test_a_study_prints_its_claims(capfd, tmp_path):
-    study = [
-        "study",
-        "frequency",
-        "--quick",
-        "--world",
-        "tiny",
-        "--seed",
-        7,
-        "--size",
-        "60x12",
-        "--out",
-        tmp_path / "study",
-    ]
-    claims = printed(capfd, *study)["claims"]
+    flags = ["--quick", "--world", "tiny", "--seed", 7, "--size", "60x12", "--out", tmp_path / "study"]
+    claims = printed(capfd, "study", "frequency", *flags)["claims"]
     assert set(claims) == {"mean-biased-by-outliers", "error-grows-with-frequency"}
     assert all(set(claim) == {"figure", "holds"} for claim in claims.values())
 
@@ -341,7 +329,7 @@ BAD = {
     "a pose outside": (["view", "--world", "tiny", "--at", "99,0,0"], ["99", "outside the world"]),
     "a pose of two numbers": (["view", "--world", "tiny", "--at", "1,2"], ["1,2", "X,Y,HEADING_DEG"]),
     "a NaN pose": (["view", "--world", "tiny", "--at", "nan,2,0"], ["nan", "outside the world"]),
-    "size 0": (["view", "--world", "tiny", "--size", "0x0"], ["0", "4"]),
+    "size 0": (["view", "--world", "tiny", "--size", "0x0"], ["width is 0", "4"]),
     "a size without numbers": (["run", *SMALL, "--size", "big", "--out", "r"], ["'big'", "columns x rows"]),
     "an unknown model": (
         ["run", *SMALL, "--model", "oracle", "--out", "r"],

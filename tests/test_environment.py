@@ -289,7 +289,7 @@ def test_frames_are_what_is_seen_enlarged(made):
 @pytest.mark.parametrize(
     ("settings", "match"),
     [
-        ({"world": "tundra"}, "unknown world 'tundra'"),
+        ({"world": "tundra"}, "there is no world 'tundra'"),
         ({"world": "tiny", "world_seed": -1}, "whole number"),
         ({"worlds": 0}, "0 worlds; give at least 1"),
         ({"worlds": 2}, "grown from a preset"),

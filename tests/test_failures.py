@@ -5,6 +5,7 @@ import re
 from itertools import pairwise
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import given
@@ -421,7 +422,7 @@ def test_a_recording_shows_the_cause_where_it_happens(tmp_path):
 def test_what_is_near_is_what_a_renderer_draws_of_it(seed, double_sided):
     """Where all of a world is near, its share of a view is what the scanlines draw: alpha."""
     world = random_world(seed, n=400, ground=False, double_sided=double_sided)
-    eye = dataclasses.replace(EYE, width=72, height=15, samples=1)
+    eye = attrs.evolve(EYE, width=72, height=15, samples=1)
     within = 10.0  # all of it
     with open_renderer(world, eye, "cpu") as renderer:
         for x, y, _ in random_poses(4, seed):
@@ -431,7 +432,7 @@ def test_what_is_near_is_what_a_renderer_draws_of_it(seed, double_sided):
 
 @pytest.mark.parametrize("double_sided", [True, False])
 def test_a_wall_covers_what_is_within_the_distance(double_sided):
-    eye = dataclasses.replace(EYE, top=np.radians(2.5), bottom=np.radians(-2.5), height=1)
+    eye = attrs.evolve(EYE, top=np.radians(2.5), bottom=np.radians(-2.5), height=1)
     wall = np.array(quad((-3.0, 0.03), (3.0, 0.03), -1, 1))  # its front towards the south
     world = world_of(wall, np.zeros((2, 3)), double_sided=double_sided)
     share = 2 * np.arccos(0.03 / 0.05) / (2 * np.pi)

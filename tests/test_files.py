@@ -1,4 +1,7 @@
-"""Every reader and writer of worlds and routes: what is written comes back, what is damaged is refused in one line."""
+"""Readers and writers of worlds and routes: what is written comes back, what is damaged is refused in one line."""
+
+import errno
+import os
 
 import numpy as np
 import pytest
@@ -10,9 +13,10 @@ from PIL import Image
 from scenes import random_world
 
 from tussock.world.atomic import replacing
-from tussock.world.errors import InputError
-from tussock.world.files import read_world, write_world
+from tussock.world.errors import DiskFullError, FileError, InputError
+from tussock.world.files import open_world, read_world, write_world
 from tussock.world.geometry import Route
+from tussock.world.params import is_generated
 from tussock.world.route_files import read_route, write_route
 from tussock.world.scene import World
 
@@ -30,7 +34,7 @@ def same(a: World, b: World) -> bool:
 @pytest.mark.parametrize(
     "world", [World.generate("tiny", 5), random_world(double_sided=False), random_world(ground=False)]
 )
-def test_a_world_comes_back_whole_and_the_same_bytes_twice(tmp_path, suffix, world):
+def test_a_world_comes_back_complete_and_is_written_alike_twice(tmp_path, suffix, world):
     for name in ("a", "b"):
         write_world(world, tmp_path / (name + suffix))
     assert (tmp_path / ("a" + suffix)).read_bytes() == (tmp_path / ("b" + suffix)).read_bytes()
@@ -90,7 +94,7 @@ def textured_square(image: np.ndarray) -> trimesh.Trimesh:
 def test_textures_are_averaged_over_each_triangle_and_kept_for_gl(tmp_path):
     image = np.zeros((64, 64, 3), dtype=np.uint8)
     across, down = np.meshgrid(np.arange(64), np.arange(64))
-    image[across + down >= 63] = (200, 100, 50)  # the lower right half of the picture
+    image[across + down >= 63] = (200, 100, 50)  # the lower right half of the image
     textured_square(image).export(tmp_path / "square.glb")
     world = read_world(tmp_path / "square.glb")
     assert np.abs(world.rgb.astype(int) - [[200, 100, 50], [0, 0, 0]]).max() <= 25  # but for the diagonal
@@ -157,6 +161,8 @@ BAD_ROUTES = {
     "x_m,y_m,heading_deg\n0,0,0\n0,0,9\n": "at least 2 distinct",
     "a,b,c\n0,0,0\n": "line 1: the columns are 'a,b,c'",
     "": "line 1",
+    "x_m,y_m,x_m,heading_deg\n0,0,0,0\n1,1,0,0\n": r"r\.csv, line 1: columns 1 and 3 are .*'x_m'; rename",
+    "y_m,heading_deg,x_m,heading_deg,heading_deg\n0,0,0,0,0\n": "columns 2 and 4 and 5 are .*'heading_deg'",
     'x_m,y_m\n"' + "1" * 200_000 + '",2\n': "cannot be read as CSV",
 }
 
@@ -206,25 +212,97 @@ def test_missing_files_are_named(tmp_path):
         read_route(tmp_path / "nowhere.csv")
 
 
-def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
+def write(path, error: BaseException | None = None):
+    """Replace a file; an error is raised in the middle of that."""
+    with replacing(path) as partial:
+        partial.write_text("half")
+        if error is not None:
+            error.filename = (
+                str(partial) if getattr(error, "filename", None) == "PARTIAL" else getattr(error, "filename", None)
+            )
+            raise error
+        partial.write_text("new")
+
+
+def test_a_file_is_replaced_as_a_whole(tmp_path):
     path = tmp_path / "w.glb"
     path.write_text("old")
+    write(path)
+    assert path.read_text() == "new"
+    assert [each.name for each in tmp_path.iterdir()] == ["w.glb"]
 
-    def fail():
-        with replacing(path) as partial:
-            partial.write_text("half")
-            raise RuntimeError
 
-    with pytest.raises(RuntimeError):
-        fail()
+ABOUT_ANOTHER_FILE = [
+    RuntimeError("no file"),
+    FileNotFoundError(errno.ENOENT, "No such file or directory", "other.txt"),
+    OSError(errno.ENOSPC, "No space left on device", "/elsewhere/other.txt"),
+    BrokenPipeError(errno.EPIPE, "Broken pipe"),
+    OSError("cannot identify image file"),
+]
+
+
+@pytest.mark.parametrize("error", ABOUT_ANOTHER_FILE, ids=lambda error: str(error)[:20])
+def test_an_error_about_another_file_is_raised_unchanged_and_the_old_file_stays(tmp_path, error):
+    path = tmp_path / "w.glb"
+    path.write_text("old")
+    with pytest.raises(type(error)) as raised:
+        write(path, error)
+    assert raised.value is error
     assert path.read_text() == "old"
-    assert [p.name for p in tmp_path.iterdir()] == ["w.glb"]
+    assert [each.name for each in tmp_path.iterdir()] == ["w.glb"]
 
 
-def test_what_cannot_be_written_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("error", "kind", "remedy"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), DiskFullError, "make room"),
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), DiskFullError, "make room"),
+        (OSError(errno.EIO, "Input/output error"), FileError, "another name"),
+        (PermissionError(errno.EACCES, "Permission denied", "PARTIAL"), FileError, "another name"),
+    ],
+    ids=str,
+)
+def test_an_error_of_writing_is_about_the_target(tmp_path, error, kind, remedy):
+    path = tmp_path / "w.glb"
+    path.write_text("old")
+    reason = error.strerror
+    with pytest.raises(kind, match=remedy) as refusal:
+        write(path, error)
+    assert str(path) in str(refusal.value)
+    assert reason in str(refusal.value)
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == ["w.glb"]
+
+
+def test_an_error_of_replacing_is_about_the_target(tmp_path, monkeypatch):
+    def fail(*names):
+        raise PermissionError(errno.EPERM, "Operation not permitted", str(names[0]), None, str(names[1]))
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(FileError, match=r"w\.glb cannot be written \(Operation not permitted\)"):
+        write(tmp_path / "w.glb")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_reported_as_such(small_disk):
+    with (
+        pytest.raises(DiskFullError, match=r"large\.bin cannot be written .*make room"),
+        replacing(small_disk / "large.bin") as partial,
+    ):
+        partial.write_bytes(b"0" * 10**6)
+    assert not list(small_disk.iterdir())
+
+
+def test_a_name_that_is_too_long_is_refused(tmp_path):
+    with pytest.raises(FileError, match="too long"):
+        write(tmp_path / ("w" * 300 + ".glb"))
+
+
+def test_a_world_that_cannot_be_written_is_refused(tmp_path):
     world = random_world()
-    with pytest.raises(InputError, match="is a folder"):
-        write_world(world, make(tmp_path / "folder.glb"))
+    (tmp_path / "folder.glb").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        write_world(world, tmp_path / "folder.glb")
     with pytest.raises(InputError, match="no folder"):
         write_world(world, tmp_path / "nowhere" / "w.glb")
     with pytest.raises(InputError, match=r"\.glb or \.ply"):
@@ -233,9 +311,35 @@ def test_what_cannot_be_written_is_refused(tmp_path):
         write_world(random_world(n=0), tmp_path / "w.glb")
 
 
-def make(folder):
-    folder.mkdir()
-    return folder
+@pytest.mark.parametrize("name", ["tiny", " tiny  field_width=2.5", "tiny field_width=2.5 tussock_rgb=(1, 2, 3)"])
+def test_nothing_in_the_current_folder_hides_a_preset(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    world = open_world(name, 3)
+    (tmp_path / "tiny").mkdir()
+    if name != "tiny":
+        (tmp_path / name).write_text("no world")
+    assert is_generated(name)
+    assert same(open_world(name, 3), world)
+
+
+@pytest.mark.parametrize(
+    "name", ["tiny world.glb", "tiny.glb", "./tiny field_width=2.5.glb", "meadow/tiny.glb", "tiny-2.5 m.ply"]
+)
+def test_a_file_may_have_a_name_that_begins_like_a_preset(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    world = random_world()
+    write_world(world, name)
+    assert not is_generated(name)
+    assert same(open_world(name), world)
+
+
+@pytest.mark.parametrize("name", ["desert", "tiny world", "desert field_width=3", ""])
+def test_a_name_of_neither_is_refused_with_the_presets(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="tussock-field") as refusal:
+        open_world(name)
+    assert repr(name) in str(refusal.value)
 
 
 def test_worlds_whose_arrays_do_not_fit_are_refused():
@@ -245,4 +349,4 @@ def test_worlds_whose_arrays_do_not_fit_are_refused():
             World(**{**vars(world), **change})
     mine = np.zeros((1, 3, 3), dtype=np.float32)
     World(**{**vars(world), "triangles": mine, "rgb": world.rgb[:1]})
-    mine[0, 0, 0] = 1  # still mine
+    mine[0, 0, 0] = 1  # the array of the caller can still be changed

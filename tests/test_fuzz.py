@@ -15,7 +15,8 @@ from tussock.navigation.models import make_model
 from tussock.navigation.models.files import load_model
 from tussock.render import Eye, open_renderer
 from tussock.render.images.database import read_database, read_image
-from tussock.render.images.files import ENTRIES, METADATA, read_entries
+from tussock.render.images.entries import ENTRIES, read_entries
+from tussock.render.images.metadata import METADATA
 from tussock.world.errors import InputError
 from tussock.world.files import read_world
 from tussock.world.routes import generate_route
@@ -72,7 +73,7 @@ def test_a_mesh_that_is_repeated_too_often_is_refused(tmp_path, monkeypatch):
     for i in range(9):
         scene.add_geometry(trimesh.creation.box(), geom_name="box", node_name=f"place{i}")
     scene.export(tmp_path / "w.glb")
-    monkeypatch.setattr("tussock.world.files.MOST_TRIANGLES", 100)
+    monkeypatch.setattr("tussock.world.files.MAX_TRIANGLES", 100)
     with pytest.raises(InputError, match="holds 108 triangles; a world has up to 100"):
         read_world(tmp_path / "w.glb")
 

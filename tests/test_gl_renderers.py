@@ -1,7 +1,7 @@
 """The OpenGL renderers against the exact CPU renderer.
 
-PyOpenGL binds a process to EGL or to OSMesa, so one of the two runs here and the other in a process of its own
-(`test_backend_in_its_own_process`). Without the GL library a test skips; with TUSSOCK_REQUIRE_GL=1 it fails.
+PyOpenGL binds a process to EGL or to OSMesa, so one of them runs here and the other one in another process
+(`test_backend_in_its_own_process`). Without the library a test is skipped; with TUSSOCK_REQUIRE_GL=1 it fails.
 """
 
 import json
@@ -21,7 +21,7 @@ from PIL import Image
 from tussock.render import Eye, Renderer, gl, open_renderer
 from tussock.render.cubemap import Cubemap, face_size_for
 from tussock.render.raster import RasterRenderer
-from tussock.world.errors import InputError
+from tussock.world.errors import InputError, MissingDependencyError, SettingError
 from tussock.world.files import read_world
 from tussock.world.geometry import Bounds, Pose, turn_of_columns
 from tussock.world.scene import Ground, World
@@ -33,10 +33,10 @@ HERE = Pose(0.0, 0.0, 0.3)
 
 @pytest.fixture(params=BACKENDS)
 def backend(request):
-    """A backend that this process can have."""
+    """A backend that this process can use."""
     name = request.param
     if gl.bound_backend() not in (None, name):
-        pytest.skip(f"this process is bound to {gl.bound_backend()}; {name} runs in a process of its own")
+        pytest.skip(f"this process is bound to {gl.bound_backend()}; {name} runs in another process")
     try:
         gl.open_context(name)
     except InputError as error:
@@ -63,7 +63,7 @@ def make_world(triangles=(), rgb=(), **kwargs) -> World:
 
 @pytest.fixture(scope="module")
 def garden() -> World:
-    """Blades from 2 mm to 25 m away, some behind others by little, and leaves that lie 1 to 5 mm above the ground."""
+    """Blades 2 mm to 25 m away, some shortly behind others, and leaves 1 to 5 mm above the ground."""
     rng = np.random.default_rng(7)
     distance = np.r_[0.002, 0.004, 0.01, np.geomspace(0.05, 25, 250)]
     angle = rng.uniform(-np.pi, np.pi, len(distance))
@@ -85,7 +85,7 @@ def difference(a, b) -> np.ndarray:
 
 
 def assert_agree(views, exact, share=0.01):
-    """Few pixels differ visibly (the promise is under 2 %), and nothing does on the whole."""
+    """Few pixels differ visibly (under 2 % is promised), and the mean does not differ."""
     assert views.shape == exact.shape
     assert (difference(views, exact) > 8).mean() < share
     assert np.abs(views.mean(axis=(0, 1, 2)) - exact.mean(axis=(0, 1, 2))).max() < 0.5
@@ -99,7 +99,7 @@ def test_agrees_with_the_exact_renderer(backend, garden):
         views, exact = ours.render(poses), cpu.render(poses)
     assert_agree(views, exact)
     palette = {(*rgb, 255) for rgb in garden.rgb.tolist()} | {(*SAND, 255), (*SKY, 0)}
-    assert {tuple(pixel) for pixel in views.reshape(-1, 4).tolist()} <= palette  # no light, gamma or mixture
+    assert {tuple(pixel) for pixel in views.reshape(-1, 4).tolist()} <= palette  # no light, gamma or mixed colours
 
 
 def test_agrees_in_the_sussex_world(backend, sussex_world):
@@ -109,7 +109,7 @@ def test_agrees_in_the_sussex_world(backend, sussex_world):
 
 
 def test_tall_pixels_are_averaged_by_solid_angle(backend, garden):
-    """A row of 40 degrees up to 80: its upper rays stand for a fifth of what its lower ones do."""
+    """In a row from 40 to 80 degrees the upper rays have a fifth of the weight of the lower ones."""
     eye = Eye(width=16, height=4, top=np.radians(80), bottom=np.radians(-80), samples=24)
     with open_renderer(garden, eye, backend) as ours, open_renderer(garden, eye, "cpu") as cpu:
         views, exact = ours.render([HERE]), cpu.render([HERE])
@@ -118,7 +118,7 @@ def test_tall_pixels_are_averaged_by_solid_angle(backend, garden):
 
 @pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub"])
 def test_agrees_in_generated_worlds(backend, preset):
-    """Full of leaves smaller than a pixel, which a cube's pixels, looking a little aside, see or do not."""
+    """Worlds full of leaves smaller than a pixel, which the pixels of a cube, in slightly other directions, may miss."""
     poses = np.array([(5, 5, 0.0), (2.5, 7.5, -1.0), (8, 3, 2.0)])
     world = World.generate(preset, seed=1)
     with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
@@ -126,7 +126,7 @@ def test_agrees_in_generated_worlds(backend, preset):
 
 
 def test_culled_sussex_frames(backend, sussex, sussex_world):
-    """The frames were drawn by an independent renderer, itself 0.35 to 1.4 grey levels from exact; twice a cube's error at most."""
+    """The frames are of another renderer, which is 0.35 to 1.4 grey levels off; the limit is twice the error of a cube."""
     world = replace(sussex_world, double_sided=False)
     for entry in json.loads((sussex / "frames" / "poses.json").read_text())["views"]:
         frame = cv2.imread(str(sussex / "frames" / entry["file"]))[..., ::-1]
@@ -154,11 +154,11 @@ def test_any_span_of_elevations(backend, garden, eye):
 def test_turning_left_rolls_right(backend, garden, columns):
     with open_renderer(garden, backend=backend) as ours:
         view, turned = ours.render([HERE, HERE.turned(float(turn_of_columns(columns, 720)))])
-    limit = 0.02 if columns % 180 else 0.0005  # by a quarter turn the cube comes to lie on itself
+    limit = 0.02 if columns % 180 else 0.0005  # a quarter turn maps the cube onto itself
     assert (difference(turned, np.roll(view, columns, axis=1)) > 8).mean() < limit
 
 
-def test_a_batch_is_its_poses(backend, garden):
+def test_a_batch_equals_its_views_one_by_one(backend, garden):
     poses = [HERE, Pose(1.0, 2.0, -2.0)]
     with open_renderer(garden, backend=backend) as ours:
         both = ours.render(poses)
@@ -181,7 +181,7 @@ def test_back_faces(backend):
     assert seen == {True: (True, True, True), False: (True, False, True)}
 
 
-def test_a_materials_factor_tints_its_texture(backend):
+def test_the_factor_of_a_material_tints_its_texture(backend):
     corners, uv = np.array([(1, 1, 0), (1, -1, 0), (1, -1, 1), (1, 1, 1)]), [(0, 0), (1, 0), (1, 1), (0, 1)]
     image = Image.fromarray(np.full((8, 8, 3), 200, np.uint8))
     material = trimesh.visual.material.PBRMaterial(baseColorTexture=image, baseColorFactor=[0, 255, 127, 255])
@@ -192,18 +192,20 @@ def test_a_materials_factor_tints_its_texture(backend):
         assert_agree(ours.render([HERE]), cpu.render([HERE]))
 
 
-def test_nothing_but_sky(backend):
+def test_an_empty_world_is_all_sky(backend):
     with open_renderer(make_world(ground=None), backend=backend) as ours:
         np.testing.assert_array_equal(ours.render([HERE]), np.full((1, 150, 720, 4), (*SKY, 0)))
 
 
 @pytest.mark.parametrize("pbr", [True, False])
 def test_a_textured_quad(backend, pbr):
-    """Three texels wide, which a careless upload would shear; the meshes replace the triangles, the ground stays."""
+    """It is three texels wide, which a wrong row alignment shears. The meshes replace the triangles; the ground stays."""
     texels = np.array(
         [[(255, 0, 0), (0, 255, 0), (0, 0, 255)], [(255, 255, 0), (0, 255, 255), (9, 90, 200)]], dtype=np.uint8
     )
-    image = Image.fromarray(np.kron(texels, np.ones((16, 16, 1), np.uint8)))  # wide enough to be flat in their middles
+    image = Image.fromarray(
+        np.kron(texels, np.ones((16, 16, 1), np.uint8))
+    )  # so that the middles of the texels are flat
     corners = np.array([(1, 0.6, 0), (1, -0.6, 0), (1, -0.6, 0.8), (1, 0.6, 0.8)])
     uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
     kind = trimesh.visual.material.PBRMaterial if pbr else trimesh.visual.material.SimpleMaterial
@@ -218,7 +220,7 @@ def test_a_textured_quad(backend, pbr):
         view = ours.render([Pose(0, 0, 0)])[0]
 
     def at(y, z):
-        """What is seen of the quad's place (1, y, z)."""
+        """The pixel that shows the point (1, y, z)."""
         up, side = np.degrees(np.arctan2(z - 0.01, np.hypot(1, y))), np.degrees(np.arctan(y))
         return view[int((60 - up) * 2), int((180 - side) * 2)]
 
@@ -230,7 +232,7 @@ def test_a_textured_quad(backend, pbr):
     assert not (view == (1, 2, 3, 255)).all(-1).any()
 
 
-def test_several_at_once(backend, garden, sussex_world):
+def test_several_renderers_at_once(backend, garden, sussex_world):
     with open_renderer(garden, backend=backend) as first:
         before = first.render([HERE])
         with open_renderer(sussex_world, Eye(width=90, height=20), backend) as second:
@@ -245,20 +247,20 @@ def test_several_at_once(backend, garden, sussex_world):
         np.testing.assert_array_equal(again.render([HERE]), before)
 
 
-def test_errors(backend, garden):
+def test_invalid_poses_sizes_and_backends_are_refused(backend, garden):
     ours = open_renderer(garden, backend=backend)
-    with pytest.raises(InputError, match="pose 0 is"):
+    with pytest.raises(SettingError, match="pose 0 is"):
         ours.render([Pose(0, np.nan, 0)])
     ours.close()
     ours.close()
     with pytest.raises(InputError, match="closed"):
         ours.render([HERE])
-    with pytest.raises(InputError, match="0 pixels"):
+    with pytest.raises(SettingError, match="0 pixels"):
         RasterRenderer(garden, Eye(), backend, face_size=0)
-    with pytest.raises(InputError, match="at most"):
+    with pytest.raises(SettingError, match=r"1000000.*at most.*face_size"):
         RasterRenderer(garden, Eye(width=8, height=2), backend, face_size=10**6)
     other = next(name for name in BACKENDS if name != backend)
-    with pytest.raises(InputError, match=f"already uses OpenGL through {backend}.* another process"):
+    with pytest.raises(SettingError, match=f"{other}.* through {backend}.* another process"):
         open_renderer(garden, backend=other)
 
 
@@ -267,12 +269,12 @@ def test_a_missing_library_is_named(garden, monkeypatch, name, package):
     monkeypatch.setattr(gl, "_loads", lambda library: False)
     monkeypatch.setattr(gl, "_context", None)
     monkeypatch.setattr(gl, "bound_backend", lambda: None)
-    with pytest.raises(InputError, match=package) as error:
+    with pytest.raises(MissingDependencyError, match=package) as error:
         open_renderer(garden, backend=name)
     assert "\n" not in str(error.value)
 
 
-def test_the_environment_is_left_alone(backend, garden):
+def test_the_environment_is_not_changed(backend, garden):
     before = dict(os.environ)
     with open_renderer(garden, backend=backend):
         assert gl.gl_device_name()
@@ -288,7 +290,7 @@ def test_cube_faces_follow_the_eye():
 
 @pytest.mark.parametrize("name", BACKENDS)
 def test_backend_in_its_own_process(name):
-    """What this process cannot have runs in another; what it has, ran here."""
+    """The tests of a backend that this process cannot use run in another process."""
     if gl.bound_backend() in (None, name):
         pytest.skip(f"{name} runs in this process")
     command = [sys.executable, "-m", "pytest", __file__, "-k", f"{name} and not own_process", "-p", "no:cacheprovider"]

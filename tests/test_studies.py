@@ -26,7 +26,7 @@ from tussock.navigation.studies.thesis.settings import Settings
 from tussock.navigation.studies.thesis.thesis import STUDIES, run_studies
 from tussock.navigation.studies.thesis.visual_compass import _minima
 from tussock.render.eye import Eye
-from tussock.render.images.writing import Grid, published_part, write_database
+from tussock.render.images.writing import Grid, published_grid_area, write_database
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError
 from tussock.world.geometry import Route, wrap_angle
@@ -254,7 +254,7 @@ def test_numbers_as_people_read_them(value, text):
 
 def test_studies_of_databases_find_what_studies_of_the_world_find(material, tmp_path):
     with open_renderer(WORLD, EYE) as renderer:
-        write_database(tmp_path / "grid", renderer, Grid.over(published_part(WORLD.field), 0.2))
+        write_database(tmp_path / "grid", renderer, Grid.over(published_grid_area(WORLD.field), 0.2))
         write_database(tmp_path / "route", renderer, ROUTE.resampled(0.02).poses)
     read = material_of_databases(tmp_path / "grid", tmp_path / "route")
     assert read.digest == material.digest
@@ -268,7 +268,7 @@ def test_studies_of_databases_find_what_studies_of_the_world_find(material, tmp_
 
 def test_databases_that_do_not_fit_a_study_are_refused(material, tmp_path):
     with open_renderer(WORLD, EYE) as renderer:
-        write_database(tmp_path / "grid", renderer, Grid.over(published_part(WORLD.field), 0.2))
+        write_database(tmp_path / "grid", renderer, Grid.over(published_grid_area(WORLD.field), 0.2))
         write_database(tmp_path / "route", renderer, ROUTE.resampled(0.1).poses)
         write_database(tmp_path / "fine", renderer, ROUTE.resampled(0.02).poses)
         write_database(tmp_path / "turned", renderer, ROUTE.resampled(0.02).poses + [0, 0, np.pi / 2])

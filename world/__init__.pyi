@@ -1,10 +1,15 @@
+from .errors import DiskFullError as DiskFullError
+from .errors import FileError as FileError
 from .errors import InputError as InputError
+from .errors import MissingDependencyError as MissingDependencyError
+from .errors import SettingError as SettingError
 from .files import open_world as open_world
 from .files import read_world as read_world
 from .files import write_world as write_world
 from .geometry import Bounds as Bounds
 from .geometry import Pose as Pose
 from .geometry import Route as Route
+from .params import WorldParams as WorldParams
 from .route_files import read_route as read_route
 from .route_files import write_route as write_route
 from .routes import generate_route as generate_route

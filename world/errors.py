@@ -1,15 +1,15 @@
-"""What a person can cause: bad input, reported in one line."""
+"""Errors that a person can cause and mend: each is reported in one line."""
 
 
 class InputError(ValueError):
-    """Input that cannot be used. Its message gives what was given, where, and what to do instead.
+    """Input that cannot be used.
 
-    The command line prints the message and exits with code 2. The subclasses tell the kinds apart.
+    Its message is one line: what was given, where, and what to do instead. The command line prints it and exits with code 2.
     """
 
 
 class SettingError(InputError):
-    """A flag, a parameter or an argument with a value that cannot be used."""
+    """A flag, a parameter or an argument with an invalid value."""
 
 
 class FileError(InputError):
@@ -21,4 +21,4 @@ class DiskFullError(FileError):
 
 
 class MissingDependencyError(InputError):
-    """A driver, library, program or display that is not on this machine."""
+    """A driver, library, program or display that is missing on this machine."""

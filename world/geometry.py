@@ -1,61 +1,78 @@
 """Poses, routes and the angle convention of the whole project (it is written nowhere else).
 
-World frame: right-handed, x east, y north, z up, metres. A heading is an angle in radians, counter-clockwise
-from +x, wrapped to [-pi, pi). A panorama of W columns looks, in column c, at the azimuth relative to the heading
+The world frame is right-handed, in metres: x east, y north, z up. A heading is an angle in radians, counter-clockwise
+from +x, wrapped to [-pi, pi). Column c of a panorama of W columns looks at the azimuth, relative to the heading,
 
     pi - (c + 1/2) * 2 pi / W
 
-so behind is at both edges, ahead in the middle and clockwise to the right. Turning left by k columns' worth of
-angle rolls the panorama right by k columns.
+so that behind is at both edges, ahead in the middle, and clockwise to the right. Turning left by the angle of k columns
+rolls the panorama right by k columns.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from .errors import InputError
+from .errors import SettingError
 
-FARTHEST = (
-    1e7  # m from 0, in each coordinate: beyond, float32 corners are metres apart, and squares of squares may overflow
-)
+MAX_COORDINATE = 1e7  # m from 0: beyond it float32 corners are metres apart, and squares of squares may overflow
 
 
 def wrap_angle(angle):
-    """Wrap an angle, or an array of them, to [-pi, pi)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi
+    """Wrap an angle, or an array of angles, to [-pi, pi) (rad)."""
+    full_turn = 2 * np.pi
+    return (angle + np.pi) % full_turn % full_turn - np.pi  # twice: rounding takes what lies just below 0 to full_turn
 
 
 def column_azimuths(width: int) -> Float[np.ndarray, " width"]:
-    """Azimuth relative to the heading at which each column of a panorama looks (rad, centre of the column)."""
+    """Azimuth, relative to the heading, at which each column of a panorama looks (rad, centre of the column)."""
     return np.pi - (np.arange(width) + 0.5) * 2 * np.pi / width
 
 
 def turn_of_columns(columns, width: int):
-    """Angle (rad, wrapped, left positive) of the turn that rolls a panorama right by `columns` of its `width`."""
+    """Turn that rolls a panorama right by a number of columns (rad, left positive, wrapped).
+
+    Args:
+        columns: Number of columns, or an array of numbers.
+        width: Columns of the panorama.
+    """
     return wrap_angle(np.asarray(columns) * 2 * np.pi / width)
 
 
 def columns_of_turn(turn, width: int, full_turn: float = 2 * np.pi):
-    """Columns, of `width`, by which a turn (rad, left positive) rolls a panorama right; neither wrapped nor rounded.
+    """Columns by which a turn rolls a panorama right; neither wrapped nor rounded.
 
-    full_turn: what a whole turn is where `turn` is not in radians. Degrees are given as they are, with 360: halfway between two
-    columns, a detour through radians would leave to chance which of them is the nearest.
+    Args:
+        turn: Angle, or an array of angles, left positive, in the unit of `full_turn`.
+        width: Columns of the panorama.
+        full_turn: A whole turn: 2 pi for radians, 360 for degrees. Give degrees as degrees: halfway between two columns, rounding
+            errors of a conversion would decide which column is the nearest.
     """
     return turn / full_turn * width
 
 
-class Pose(NamedTuple):
-    """Where an eye stands and where it faces. `np.asarray([pose, ...])` is the (n, 3) array renderers take."""
+class Pose(NamedTuple("Pose", [("x", float), ("y", float), ("heading", float)])):
+    """Position and heading of an eye. `np.asarray([pose, ...])` is the (n, 3) array that renderers take.
 
-    x: float  # m
-    y: float  # m
-    heading: float  # rad, counter-clockwise from +x
+    Attributes:
+        x: Position to the east (m).
+        y: Position to the north (m).
+        heading: Direction in which the eye faces (rad, counter-clockwise from +x); wrapped if it is not in [-pi, pi).
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, x: float, y: float, heading: float) -> "Pose":
+        if isfinite(heading) and not -np.pi <= heading < np.pi:
+            heading = float(wrap_angle(heading))
+        return super().__new__(cls, x, y, heading)
 
     def turned(self, angle: float) -> "Pose":
-        """The same place, turned left by `angle` (rad)."""
+        """The same position, turned left by `angle` (rad)."""
         return Pose(self.x, self.y, float(wrap_angle(self.heading + angle)))
 
     def moved(self, forward: float, left: float = 0.0) -> "Pose":
@@ -72,9 +89,18 @@ class Bounds(NamedTuple):
     x_max: float
     y_max: float
 
+    @property
+    def size(self) -> Float[np.ndarray, "2"]:
+        """Extent along x and along y (m)."""
+        return np.array([self.x_max - self.x_min, self.y_max - self.y_min], dtype=np.float64)
+
     def contains(self, x, y):
         """Whether points lie inside (borders included); works on arrays."""
         return (x >= self.x_min) & (x <= self.x_max) & (y >= self.y_min) & (y <= self.y_max)
+
+    def widened(self, margin: float) -> "Bounds":
+        """The rectangle with a margin added on every side (m); a negative margin makes it smaller."""
+        return Bounds(self.x_min - margin, self.y_min - margin, self.x_max + margin, self.y_max + margin)
 
     def __str__(self) -> str:
         return f"x {self.x_min:g}..{self.x_max:g} m, y {self.y_min:g}..{self.y_max:g} m"
@@ -84,7 +110,9 @@ class Bounds(NamedTuple):
 class Route:
     """A path over the ground with a heading at each of its points.
 
-    poses: (n, 3) x [m], y [m], heading [rad]; n >= 2, within FARTHEST, consecutive points apart.
+    Attributes:
+        poses: (n, 3) x (m), y (m) and heading (rad, wrapped) of each point. At least 2 points, within MAX_COORDINATE. Of
+            consecutive points at the same position the first is kept.
     """
 
     poses: Float[np.ndarray, "n 3"]
@@ -92,27 +120,27 @@ class Route:
     def __post_init__(self):
         poses = np.array(self.poses, dtype=np.float64)
         if poses.ndim != 2 or poses.shape[1] != 3:
-            raise InputError(f"a route needs points (x, y, heading), got an array of shape {poses.shape}")
-        near = np.abs(poses) <= FARTHEST  # False for nan, too
-        if not near.all():
-            row = int(near.all(axis=1).argmin())
-            raise InputError(
-                f"route point {row + 1} is {poses[row].tolist()}; a route needs finite numbers up to {FARTHEST:g}"
+            raise SettingError(f"a route needs points (x, y, heading), got an array of shape {poses.shape}")
+        valid = np.abs(poses) <= MAX_COORDINATE  # False for nan
+        if not valid.all():
+            row = int(valid.all(axis=1).argmin())
+            raise SettingError(
+                f"route point {row + 1} is {poses[row].tolist()}; a route needs finite numbers up to {MAX_COORDINATE:g}"
             )
         keep = np.r_[True, np.hypot(*np.diff(poses[:, :2], axis=0).T) > 1e-9]  # m
         poses = poses[keep]
         if len(poses) < 2:
-            raise InputError(f"a route needs at least 2 distinct points, got {len(poses)}")
+            raise SettingError(f"a route needs at least 2 distinct points, got {len(poses)}")
         poses[:, 2] = wrap_angle(poses[:, 2])
         object.__setattr__(self, "poses", poses)
 
     @classmethod
     def through(cls, xy: Float[np.ndarray, "n 2"]) -> "Route":
-        """The route through points (m), each heading towards the next one (the last keeps the direction it came in)."""
+        """The route through points (m), each heading towards the next one; the last keeps the heading of the one before."""
         xy = np.asarray(xy, dtype=np.float64)
         if xy.ndim != 2 or xy.shape[1] != 2 or len(xy) < 2:
-            raise InputError(f"a route needs at least 2 points (x, y), got an array of shape {xy.shape}")
-        with np.errstate(all="ignore"):  # the route refuses what is not finite
+            raise SettingError(f"a route needs at least 2 points (x, y), got an array of shape {xy.shape}")
+        with np.errstate(all="ignore"):  # the constructor refuses values that are not finite
             steps = np.diff(xy, axis=0)
         heading = np.arctan2(steps[:, 1], steps[:, 0])
         return cls(np.column_stack([xy, np.r_[heading, heading[-1]]]))
@@ -134,7 +162,7 @@ class Route:
 
     @cached_property
     def arc(self) -> Float[np.ndarray, " n"]:
-        """Distance along the route of each point (m)."""
+        """Distance of each point along the route (m)."""
         return np.r_[0.0, np.cumsum(np.hypot(*np.diff(self.xy, axis=0).T))]
 
     @property
@@ -155,34 +183,41 @@ class Route:
         return np.column_stack([x, y, wrap_angle(heading)])
 
     def turning(self, distance, reach: float) -> Float[np.ndarray, " k"]:
-        """Change of direction at distances along the route (m), from the chord of `reach` (m) before to the one after: rad, 0 to pi.
+        """Change of direction at distances along the route (rad, 0 to pi).
 
-        0 nearer than `reach` to an end.
+        Args:
+            distance: Positions along the route (m).
+            reach: Length of the stretches before and after, whose directions are compared (m). The change is 0 nearer than
+                this to an end.
         """
         distance = np.atleast_1d(distance)
-        before, here, after = (self.at(distance + off)[:, :2] for off in (-reach, 0.0, reach))
-        came, goes = here - before, after - here
-        turned = np.abs(wrap_angle(np.arctan2(goes[:, 1], goes[:, 0]) - np.arctan2(came[:, 1], came[:, 0])))
-        return np.where((distance < reach) | (distance > self.length - reach), 0.0, turned)
+        before, here, after = (self.at(distance + offset)[:, :2] for offset in (-reach, 0.0, reach))
+        arriving, leaving = here - before, after - here
+        turn = np.arctan2(leaving[:, 1], leaving[:, 0]) - np.arctan2(arriving[:, 1], arriving[:, 0])
+        return np.where((distance < reach) | (distance > self.length - reach), 0.0, np.abs(wrap_angle(turn)))
 
     def resampled(self, spacing: float) -> "Route":
-        """The route with a pose every `spacing` metres of arc length, from its start."""
+        """The route with a pose every `spacing` metres of its length, from its start."""
         if not (np.isfinite(spacing) and 0 < spacing <= self.length):
-            raise InputError(
+            raise SettingError(
                 f"spacing {spacing:g} m does not fit a route of {self.length:.3f} m; give 0 < spacing <= length"
             )
         if self.length / spacing > 10**6:
-            raise InputError(
+            raise SettingError(
                 f"spacing {spacing:g} m cuts a route of {self.length:.3f} m into over a million; give a wider one"
             )
         return Route(self.at(np.arange(0.0, self.length * (1 + 1e-12), spacing)))
 
     def nearest(self, xy: Float[np.ndarray, "k 2"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-        """Distance to the route's polyline (m), and how far along the route (m) that nearest place is, of points."""
+        """Where the route is nearest to points (m).
+
+        Returns:
+            The distance of each point to the route, and how far along the route its nearest position is (both m).
+        """
         xy = np.asarray(xy, dtype=np.float64)
-        at_once = max(1, 10**6 // len(self.xy))  # bounds the memory of all distances
-        if len(xy) > at_once:
-            parts = [self.nearest(xy[i : i + at_once]) for i in range(0, len(xy), at_once)]
+        batch = max(1, 10**6 // len(self.xy))  # bounds the memory of all distances
+        if len(xy) > batch:
+            parts = [self.nearest(xy[i : i + batch]) for i in range(0, len(xy), batch)]
             return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
         (x, y), (dx, dy) = self.xy[:-1].T, np.diff(self.xy, axis=0).T
         length = np.hypot(dx, dy)

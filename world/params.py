@@ -1,155 +1,202 @@
-"""What a generated world is like: parameters with their units and ranges, and the presets."""
+"""What a generated world is like: its parameters, the presets, and which texts name a generated world."""
 
-import dataclasses
-from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, ClassVar
 
-from .errors import InputError
-from .scene import RGB, check_colour
-from .specs import parse_parameters, split_words
+import attrs
 
-
-def _number(default: float | int, unit: str, low: float | int, high: float | int) -> Any:
-    """A field of WorldParams with its unit and the range it must lie in."""
-    return dataclasses.field(default=default, metadata={"unit": unit, "low": low, "high": high})
+from .errors import SettingError
+from .geometry import Bounds
+from .registry import LOCATION, Registry
+from .settings import RGB, colour, number, settings, whole
 
 
-@dataclass(frozen=True, kw_only=True)
+@settings
 class WorldParams:
-    """What a generated world is like. Densities count plants a square metre of field and border.
+    """Parameters of a generated world. Densities count plants per square metre of the field and its border.
 
-    Colours are what sunlit vegetation of middling height shows; light, shade and individual plants vary around them.
-    Raises InputError for a value outside its range.
+    Colours are those of sunlit plants of medium height: light, shade and individual plants vary around them. Heights are medians.
+    `describe(WorldParams)` gives the unit and range of each parameter.
+
+    Attributes:
+        field_width: Extent of the field from west to east; its south-western corner is at (0, 0).
+        field_depth: Extent of the field from south to north.
+        border: Plants also grow within this distance around the field.
+        ground_margin: The ground continues this far around the field.
+        ground_rgb: Colour of the ground.
+        sky_rgb: Colour of the sky.
+        patch_size: Distance between fertile and poor ground.
+        patchiness: Standard deviation of the log density of plants between fertile and poor ground.
+        cluster_plants: Mean number of plants in a cluster.
+        cluster_radius: Standard deviation of the positions in a cluster.
+        size_spread: Standard deviation of the log heights of plants.
+        clearings: Number of clearings.
+        clearing_radius: Median radius of a clearing.
+        corridor_width: Width of the open corridors that wind through the field; 0 for none.
+        tussock_density: Density of tussocks.
+        tussock_height: Height of a tussock.
+        tussock_blades: Number of blades of a tussock of median height.
+        tussock_rgb: Colour of living blades.
+        dry_rgb: Colour of dry blades.
+        dry_share: Mean share of dry blades in a tussock; grass is dry in the same places.
+        grass_density: Density of tufts of grass.
+        grass_height: Height of a tuft.
+        grass_blades: Maximum number of blades in a tuft.
+        grass_near_tussocks: Share of the tufts that grow at the foot of a tussock.
+        grass_rgb: Colour of grass.
+        flower_share: Share of the tufts that have a flower.
+        flower_rgb: Colour of flowers.
+        bush_density: Density of bushes.
+        bush_height: Height of a bush.
+        bush_leaves: Number of leaves of a bush of median height.
+        bush_rgb: Colour of the leaves of bushes.
+        bark_rgb: Colour of the wood of bushes and trees.
+        leaf_density: Density of fallen leaves.
+        leaf_length: Length of a fallen leaf.
+        leaf_rgb: Colour of fallen leaves.
+        stone_density: Density of stones.
+        stone_size: Largest width of a stone.
+        stone_corners: Number of random points that a stone is the hull of.
+        stone_rgb: Colour of stones.
+        trees: Number of trees on the skyline, all around the field.
+        tree_height: Height of a tree.
+        tree_distance: Median distance of a tree from the edge of the field.
+        tree_gaps: Share of the horizon without trees.
+        tree_leaves: Number of triangles of a crown.
+        tree_rgb: Colour of crowns in some directions.
+        tree_other_rgb: Colour of crowns in the other directions.
+        haze: Share of the sky's colour in a tree's, per metre of distance from the field.
     """
 
-    field_width: float = _number(10.0, "m", 1, 50)  # east-west; the field's corner is at x = y = 0
-    field_depth: float = _number(10.0, "m", 1, 50)  # north-south
-    border: float = _number(1.0, "m", 0, 10)  # vegetation goes on this far around the field
-    ground_margin: float = _number(15.0, "m", 1, 200)  # ground goes on this far around the field
-    ground_rgb: RGB = (203, 170, 118)
-    sky_rgb: RGB = (188, 212, 232)
+    name: ClassVar[str] = "world"  # in errors
 
-    patch_size: float = _number(1.4, "m", 0.1, 20)  # how far fertile and poor ground lie apart
-    patchiness: float = _number(0.9, "log density", 0, 3)  # how much they differ (standard deviation)
-    cluster_plants: float = _number(5, "plants", 1, 100)  # mean size of a family of plants
-    cluster_radius: float = _number(0.4, "m", 0.01, 10)
-    size_spread: float = _number(0.38, "log height", 0, 1)  # standard deviation of plants' log heights
-    clearings: int = _number(2, "clearings", 0, 100)
-    clearing_radius: float = _number(0.7, "m", 0.01, 10)
-    corridor_width: float = _number(0.4, "m", 0, 5)
+    field_width: float = number(10.0, low=1, high=50, unit="m")
+    field_depth: float = number(10.0, low=1, high=50, unit="m")
+    border: float = number(1.0, low=0, high=10, unit="m")
+    ground_margin: float = number(15.0, low=1, high=200, unit="m")
+    ground_rgb: RGB = colour((203, 170, 118))
+    sky_rgb: RGB = colour((188, 212, 232))
 
-    tussock_density: float = _number(1.0, "1/m2", 0, 20)
-    tussock_height: float = _number(0.3, "m", 0.02, 2)  # median, as all heights here
-    tussock_blades: int = _number(16, "blades", 1, 500)  # of a tussock of median height
-    tussock_rgb: RGB = (116, 152, 58)
-    dry_rgb: RGB = (196, 168, 92)
-    dry_share: float = _number(0.25, "share of tussock blades", 0, 1)  # grass dries with them
+    patch_size: float = number(1.4, low=0.1, high=20, unit="m")
+    patchiness: float = number(0.9, low=0, high=3, unit="log density")
+    cluster_plants: float = number(5.0, low=1, high=100, unit="plants")
+    cluster_radius: float = number(0.4, low=0.01, high=10, unit="m")
+    size_spread: float = number(0.38, low=0, high=1, unit="log height")
+    clearings: int = whole(2, low=0, high=100, unit="clearings")
+    clearing_radius: float = number(0.7, low=0.01, high=10, unit="m")
+    corridor_width: float = number(0.4, low=0, high=5, unit="m")
 
-    grass_density: float = _number(14.0, "1/m2", 0, 200)
-    grass_height: float = _number(0.085, "m", 0.01, 1)
-    grass_blades: int = _number(3, "blades", 1, 20)  # at most, a tuft
-    grass_near_tussocks: float = _number(0.4, "share of grass", 0, 1)
-    grass_rgb: RGB = (150, 164, 74)
-    flower_share: float = _number(0.02, "share of grass", 0, 1)
-    flower_rgb: RGB = (226, 190, 60)
+    tussock_density: float = number(1.0, low=0, high=20, unit="1/m2")
+    tussock_height: float = number(0.3, low=0.02, high=2, unit="m")
+    tussock_blades: int = whole(16, low=1, high=500, unit="blades")
+    tussock_rgb: RGB = colour((116, 152, 58))
+    dry_rgb: RGB = colour((196, 168, 92))
+    dry_share: float = number(0.25, low=0, high=1, unit="share of tussock blades")
 
-    bush_density: float = _number(0.06, "1/m2", 0, 5)
-    bush_height: float = _number(0.55, "m", 0.05, 3)
-    bush_leaves: int = _number(150, "leaves", 3, 5000)
-    bush_rgb: RGB = (74, 108, 62)
-    bark_rgb: RGB = (98, 76, 58)
+    grass_density: float = number(14.0, low=0, high=200, unit="1/m2")
+    grass_height: float = number(0.085, low=0.01, high=1, unit="m")
+    grass_blades: int = whole(3, low=1, high=20, unit="blades")
+    grass_near_tussocks: float = number(0.4, low=0, high=1, unit="share of grass")
+    grass_rgb: RGB = colour((150, 164, 74))
+    flower_share: float = number(0.02, low=0, high=1, unit="share of grass")
+    flower_rgb: RGB = colour((226, 190, 60))
 
-    leaf_density: float = _number(0.9, "1/m2", 0, 50)
-    leaf_length: float = _number(0.055, "m", 0.005, 0.5)
-    leaf_rgb: RGB = (158, 94, 46)
+    bush_density: float = number(0.06, low=0, high=5, unit="1/m2")
+    bush_height: float = number(0.55, low=0.05, high=3, unit="m")
+    bush_leaves: int = whole(150, low=3, high=5000, unit="leaves")
+    bush_rgb: RGB = colour((74, 108, 62))
+    bark_rgb: RGB = colour((98, 76, 58))
 
-    stone_density: float = _number(0.13, "1/m2", 0, 10)
-    stone_size: float = _number(0.16, "m", 0.01, 2)  # median of its largest width
-    stone_corners: int = _number(18, "corners", 6, 200)
-    stone_rgb: RGB = (150, 142, 134)
+    leaf_density: float = number(0.9, low=0, high=50, unit="1/m2")
+    leaf_length: float = number(0.055, low=0.005, high=0.5, unit="m")
+    leaf_rgb: RGB = colour((158, 94, 46))
 
-    trees: int = _number(32, "trees", 0, 1000)  # of the skyline, all around the field
-    tree_height: float = _number(2.5, "m", 0.2, 10)
-    tree_distance: float = _number(2.4, "m", 0.1, 50)  # median, from the edge of the field
-    tree_gaps: float = _number(0.3, "share of the horizon", 0, 0.95)
-    tree_leaves: int = _number(100, "triangles", 3, 5000)
-    tree_rgb: RGB = (72, 98, 56)
-    tree_other_rgb: RGB = (122, 112, 48)  # what the trees of other directions tend to
-    haze: float = _number(0.035, "share of sky a metre", 0, 1)
+    stone_density: float = number(0.13, low=0, high=10, unit="1/m2")
+    stone_size: float = number(0.16, low=0.01, high=2, unit="m")
+    stone_corners: int = whole(18, low=6, high=200, unit="corners")
+    stone_rgb: RGB = colour((150, 142, 134))
 
-    def __post_init__(self):
-        for item in dataclasses.fields(self):
-            value = getattr(self, item.name)
-            if item.metadata:
-                object.__setattr__(self, item.name, _checked(item, value))
-            else:
-                check_colour(item.name, value)
+    trees: int = whole(32, low=0, high=1000, unit="trees")
+    tree_height: float = number(2.5, low=0.2, high=10, unit="m")
+    tree_distance: float = number(2.4, low=0.1, high=50, unit="m")
+    tree_gaps: float = number(0.3, low=0, high=0.95, unit="share of the horizon")
+    tree_leaves: int = whole(100, low=3, high=5000, unit="triangles")
+    tree_rgb: RGB = colour((72, 98, 56))
+    tree_other_rgb: RGB = colour((122, 112, 48))
+    haze: float = number(0.035, low=0, high=1, unit="share of sky per metre")
+
+    @property
+    def field(self) -> Bounds:
+        """The field (m)."""
+        return Bounds(0.0, 0.0, self.field_width, self.field_depth)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "WorldParams":
-        """Parameters from plain JSON types, as `World.origin["params"]` has them; missing ones take their defaults."""
+        """Parameters from plain JSON types, as in `World.origin["params"]`; missing ones take their defaults."""
         if not isinstance(values, dict):
-            raise InputError(f"parameters of a world are names and values, got {values!r}")
-        names = {item.name for item in dataclasses.fields(cls)}
-        if unknown := sorted(set(map(str, values)) - names):
-            raise InputError(f"{unknown[0]!r} is no parameter of a world; there are {', '.join(sorted(names))}")
-        plain: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
-        return cls(**plain)
-
-    @classmethod
-    def named(cls, text: str) -> "WorldParams":
-        """Those of a preset, which parameters may follow: "tussock-field field_width=20 tussock_density=2".
-
-        Raises InputError for unknown presets and parameters, and for values out of range.
-        """
-        name, *words = split_words(text) or [""]
-        if name not in PRESETS:
-            raise InputError(f"unknown preset {name!r}; known: {', '.join(PRESETS)}")
-        try:
-            return dataclasses.replace(PRESETS[name], **parse_parameters(words, name, cls))
-        except InputError as error:
-            raise InputError(f"world {text!r}: {error}") from error
+            raise SettingError(f"parameters of a world are names and values, got {values!r}")
+        names = [each.name for each in attrs.fields(cls)]
+        if unknown := [str(name) for name in values if name not in names]:
+            raise SettingError(f"a world has no parameter {unknown[0]!r}; its parameters are {', '.join(names)}")
+        return cls(**values)
 
     def to_dict(self) -> dict[str, Any]:
         """The parameters as plain JSON types."""
-        return {name: list(v) if isinstance(v, tuple) else v for name, v in dataclasses.asdict(self).items()}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in attrs.asdict(self).items()}
 
 
-def _checked(item: dataclasses.Field, value) -> float | int:
-    """The value of a numeric field as the type it is declared to be. Raises InputError if it cannot be used."""
-    kind, wanted = (int, "a whole number") if item.type in (int, "int") else (float, "a number")
-    low, high, unit = item.metadata["low"], item.metadata["high"], item.metadata["unit"]
-    if isinstance(value, bool) or not isinstance(value, kind | int) or not low <= value <= high:
-        raise InputError(f"{item.name} is {value!r}; give {wanted} in {low:g}..{high:g} ({unit})")
-    return kind(value)
+MEADOW = partial(
+    WorldParams, ground_rgb=(172, 152, 102), sky_rgb=(176, 208, 238), cluster_plants=9.0, cluster_radius=0.5, clearings=4,
+    tussock_density=0.4, tussock_height=0.24, tussock_rgb=(96, 150, 54), dry_share=0.08,
+    grass_density=20.0, grass_height=0.13, grass_near_tussocks=0.15, grass_rgb=(122, 170, 62), flower_share=0.16,
+    flower_rgb=(226, 96, 130), bush_density=0.02, bush_rgb=(70, 124, 58), stone_density=0.03, leaf_density=0.3,
+    trees=42, tree_height=2.4, tree_gaps=0.2, tree_rgb=(64, 112, 58), tree_other_rgb=(96, 132, 60),
+)  # fmt: skip
+SCRUB = partial(
+    WorldParams, ground_rgb=(206, 148, 104), sky_rgb=(196, 214, 226), patchiness=1.1, corridor_width=0.5,
+    tussock_density=0.45, tussock_height=0.2, tussock_rgb=(150, 148, 84), dry_rgb=(214, 186, 120), dry_share=0.4,
+    grass_density=11.0, grass_height=0.07, grass_rgb=(176, 160, 96), flower_share=0.0,
+    bush_density=0.2, bush_height=0.5, bush_leaves=125, bush_rgb=(98, 116, 78), stone_density=0.4, stone_size=0.2,
+    stone_rgb=(168, 128, 104), trees=32, tree_height=2.0, tree_gaps=0.45, tree_rgb=(88, 100, 66), tree_other_rgb=(132, 104, 70),
+)  # fmt: skip
+TINY = partial(  # fewer than 200 triangles for any seed
+    WorldParams, field_width=3.0, field_depth=3.0, border=0.0, ground_margin=6.0, patchiness=0.3, cluster_plants=1.0,
+    clearings=0, corridor_width=0.0, size_spread=0.25, tussock_density=0.56, tussock_height=0.24, tussock_blades=4,
+    grass_density=1.78, grass_blades=2, grass_height=0.04, flower_share=0.0, bush_density=0.0, leaf_density=0.0,
+    stone_density=0.0, trees=7, tree_height=1.3, tree_distance=0.9, tree_leaves=8,
+)  # fmt: skip
+
+# A preset returns WorldParams, or takes a seed and returns a World.
+WORLDS = Registry(
+    "worlds", "world", {
+        "tussock-field": "tussock.world.params:WorldParams",
+        "meadow": "tussock.world.params:MEADOW",
+        "scrub": "tussock.world.params:SCRUB",
+        "tiny": "tussock.world.params:TINY",
+    },
+)  # fmt: skip
 
 
-PRESETS: dict[str, WorldParams] = {
-    "tussock-field": WorldParams(),
-    "meadow": WorldParams(
-        ground_rgb=(172, 152, 102), sky_rgb=(176, 208, 238), cluster_plants=9.0, cluster_radius=0.5, clearings=4,
-        tussock_density=0.4, tussock_height=0.24, tussock_rgb=(96, 150, 54), dry_share=0.08,
-        grass_density=20.0, grass_height=0.13, grass_near_tussocks=0.15, grass_rgb=(122, 170, 62), flower_share=0.16,
-        flower_rgb=(226, 96, 130), bush_density=0.02, bush_rgb=(70, 124, 58), stone_density=0.03, leaf_density=0.3,
-        trees=42, tree_height=2.4, tree_gaps=0.2, tree_rgb=(64, 112, 58), tree_other_rgb=(96, 132, 60),
-    ),
-    "scrub": WorldParams(
-        ground_rgb=(206, 148, 104), sky_rgb=(196, 214, 226), patchiness=1.1, corridor_width=0.5,
-        tussock_density=0.45, tussock_height=0.2, tussock_rgb=(150, 148, 84), dry_rgb=(214, 186, 120),
-        dry_share=0.4, grass_density=11.0, grass_height=0.07, grass_rgb=(176, 160, 96), flower_share=0.0,
-        bush_density=0.2, bush_height=0.5, bush_leaves=125, bush_rgb=(98, 116, 78), stone_density=0.4, stone_size=0.2,
-        stone_rgb=(168, 128, 104), trees=32, tree_height=2.0, tree_gaps=0.45, tree_rgb=(88, 100, 66),
-        tree_other_rgb=(132, 104, 70),
-    ),
-    "tiny": WorldParams(  # fewer than 200 triangles whatever the seed
-        field_width=3.0, field_depth=3.0, border=0.0, ground_margin=6.0, patchiness=0.3, cluster_plants=1.0,
-        clearings=0, corridor_width=0.0, size_spread=0.25, tussock_density=0.56, tussock_height=0.24, tussock_blades=4,
-        grass_density=1.78, grass_blades=2, grass_height=0.04, flower_share=0.0, bush_density=0.0, leaf_density=0.0,
-        stone_density=0.0, trees=7, tree_height=1.3, tree_distance=0.9, tree_leaves=8,
-    ),
-}  # fmt: skip
+def is_generated(text: str) -> bool:
+    """Whether a text names a world to generate; otherwise it names a file.
+
+    It does if its first word is the name of a preset, or `package.module:name`, and nothing but parameters (with `=`) follows.
+    So "tiny world.glb" is a file. What is in the current folder does not matter: "tiny" is the preset, "./tiny" the file.
+    """
+    name, *words = text.split() or [""]
+    return (name in WORLDS or bool(LOCATION.fullmatch(name))) and (not words or "=" in text)
 
 
-def is_generated(world: str) -> bool:
-    """Whether a world that is called so is grown, from a preset, rather than read from a file."""
-    return next(iter(world.split()), "") in PRESETS
+def check_preset(text: str) -> None:
+    """Refuse an unknown preset, and invalid parameters of one, without generating the world. Raises SettingError.
+
+    Values are not checked for a preset from outside, unless it is made of WorldParams by functools.partial.
+    """
+    spec = WORLDS.spec(text)
+    if getattr(spec.target, "func", spec.target) is WorldParams:
+        spec.make()
+
+
+def preset_of(params: WorldParams) -> str | None:
+    """The name of tussock's preset that has these parameters, or None."""
+    return next((name for name in WORLDS.builtin if WORLDS.find(name)() == params), None)

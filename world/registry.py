@@ -1,8 +1,6 @@
-"""Registries: names for classes that tussock brings, that installed packages bring, or that a script registers.
+"""Registries: classes and functions by name, those of tussock, of installed packages and of scripts."""
 
-Anything else is named by where it stands, as `package.module:Class`.
-"""
-
+import re
 import sys
 from collections.abc import Mapping
 from functools import cached_property
@@ -13,16 +11,19 @@ from typing import Any
 from .errors import SettingError
 from .specs import Spec, parse_spec
 
+LOCATION = re.compile(r"\w+(\.\w+)*:\w+")  # `package.module:Class`, the name of anything that is not registered
+
 
 class Registry:
-    """Classes (or functions) of one kind, by name.
+    """Classes or functions of one kind, by name.
 
-    Names are looked up among those of tussock, then those that were registered, then the entry points of installed packages.
+    A name is looked up among those of tussock, then among those that were registered in this process, then among the entry
+    points of installed packages. Anything else is named by its location, `package.module:Class`.
 
     Attributes:
-        group: Name of the registry, and after `tussock.` of its group of entry points.
+        group: Name of the registry. `tussock.` and this is its group of entry points.
         kind: What is registered, for messages.
-        builtin: Names of tussock's own, each with where it stands, as `module:Class`.
+        builtin: The names of tussock, each with its location.
     """
 
     def __init__(self, group: str, kind: str, builtin: Mapping[str, str]):
@@ -30,36 +31,40 @@ class Registry:
         self._registered: dict[str, Any] = {}
 
     def register(self, name: str, target: Any) -> None:
-        """Enter something under a name, for this process. Raises SettingError for a name that tussock uses itself."""
+        """Add a name for this process. Raises SettingError for a name of tussock, and for one that a spec could not hold."""
         if name in self.builtin:
             raise SettingError(f"{name!r} is a {self.kind} of tussock; register yours under another name")
-        if not name or any(character.isspace() or character in "|,=()" for character in name):
+        if not name or re.search(r"[\s|,=()]", name):
             raise SettingError(f"{name!r} cannot name a {self.kind}; give a name without spaces and without | , = ( )")
         self._registered[name] = target
 
     @property
     def names(self) -> list[str]:
-        """All names: tussock's own first, in their order."""
+        """All names, those of tussock first."""
         return list(dict.fromkeys([*self.builtin, *self._registered, *self._installed]))
 
     def __contains__(self, name: str) -> bool:
         return name in self.builtin or name in self._registered or name in self._installed
 
     def find(self, name: str, *, importing: bool = True) -> Any:
-        """What a name stands for; `package.module:Class` is imported, unless importing is False, and then known.
+        """The class or function of a name.
 
-        Raises SettingError for an unknown name, which lists the known ones.
+        Args:
+            name: A known name, or a location.
+            importing: Whether a location may be imported; it is a known name from then on.
+
+        Raises:
+            SettingError: For a name that is unknown or cannot be imported. It lists the known names.
         """
         if name in self.builtin:
-            return _attribute(self.builtin[name])
+            return _load(self.builtin[name])
+        if name not in self and importing and LOCATION.fullmatch(name):
+            self._registered[name] = self._import(name)
         if name in self._registered:
             return self._registered[name]
         if name in self._installed:
-            return self._loaded(self._installed[name])
-        if ":" in name and importing:
-            self._registered[name] = self._imported(name)
-            return self._registered[name]
-        hint = "import it first" if ":" in name else "or package.module:Class"
+            return self._open(self._installed[name])
+        hint = "import it first" if LOCATION.fullmatch(name) else "or package.module:Class"
         raise SettingError(f"unknown {self.kind} {name!r}; known: {', '.join(self.names)}, {hint}")
 
     def spec(self, text: str) -> Spec:
@@ -70,21 +75,20 @@ class Registry:
             raise error if repr(text) in str(error) else SettingError(f"{self.kind} {text!r}: {error}") from error
 
     def name_of(self, target: Any) -> str:
-        """The name of something: the one it is known by, else where it stands."""
-        for name, known in self._registered.items():
-            if known is target:
+        """The name of a class or function, or its location if it has none."""
+        for name, registered in self._registered.items():
+            if registered is target:
                 return name
-        where = f"{target.__module__}:{target.__qualname__}"
-        for name, place in {**self.builtin, **{each.name: each.value for each in self._installed.values()}}.items():
-            if place == where:
-                return name
-        return where
+        location = f"{target.__module__}:{target.__qualname__}"
+        known = {name: point.value for name, point in self._installed.items()} | self.builtin
+        return next((name for name, value in known.items() if value == location), location)
 
     @cached_property
     def _installed(self) -> dict[str, EntryPoint]:
         return {each.name: each for each in entry_points(group=f"tussock.{self.group}")}
 
-    def _loaded(self, point: EntryPoint) -> Any:
+    def _open(self, point: EntryPoint) -> Any:
+        """What an entry point of an installed package refers to."""
         try:
             return point.load()
         except (ImportError, AttributeError) as error:
@@ -92,20 +96,20 @@ class Registry:
                 f"the {self.kind} {point.name!r} of an installed package cannot be loaded ({error}); repair the package"
             ) from error
 
-    def _imported(self, name: str) -> Any:
-        """What stands at `package.module:Class`; modules of the current folder are found as well, as with python -m."""
+    def _import(self, location: str) -> Any:
+        """What is at a location. Modules in the current folder are found as well, after all others."""
         if "" not in sys.path:
             sys.path.append("")
         try:
-            return _attribute(name)
-        except (ImportError, AttributeError, ValueError) as error:
+            return _load(location)
+        except (ImportError, SyntaxError, AttributeError, ValueError) as error:
             raise SettingError(
-                f"the {self.kind} {name!r} cannot be imported ({error}); give package.module:Class of an installed package, or of a "
-                "file in this folder"
+                f"the {self.kind} {location!r} cannot be imported ({error}); give package.module:Class of an installed package, "
+                "or of a file in the current folder"
             ) from error
 
 
-def _attribute(where: str) -> Any:
-    """What stands at `module:attribute`."""
-    module, _, attribute = where.partition(":")
-    return getattr(import_module(module), attribute)
+def _load(location: str) -> Any:
+    """What is at a location."""
+    module, _, name = location.partition(":")
+    return getattr(import_module(module), name)

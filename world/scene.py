@@ -2,52 +2,62 @@
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from .errors import InputError
-from .geometry import FARTHEST, Bounds
-
-if TYPE_CHECKING:
-    from .params import WorldParams
-
-RGB = tuple[int, int, int]
+from .errors import SettingError
+from .generate import GENERATOR, generate_plants
+from .geometry import MAX_COORDINATE, Bounds
+from .params import WORLDS, WorldParams, preset_of
+from .settings import RGB
 
 
-def check_colour(name: str, value: Any) -> None:
-    """Refuse what is no colour. Raises InputError."""
-    whole = isinstance(value, tuple) and len(value) == 3 and all(isinstance(c, int) and 0 <= c <= 255 for c in value)
-    if not whole:
-        raise InputError(f"{name} is {value!r}; a colour is three whole numbers 0..255")
+def check_colour(label: str, value: Any) -> None:
+    """Refuse an invalid colour. Raises SettingError."""
+    numbers = isinstance(value, tuple) and len(value) == 3 and all(isinstance(c, int) and 0 <= c <= 255 for c in value)
+    if not numbers:
+        raise SettingError(f"{label} is {value!r}; give three whole numbers from 0 to 255")
 
 
-def check_bounds(name: str, bounds: Bounds) -> None:
-    """Refuse what is no rectangle of places within FARTHEST. Raises InputError."""
-    numbers = all(isinstance(b, int | float) and not isinstance(b, bool) and abs(b) <= FARTHEST for b in bounds)
+def check_bounds(label: str, bounds: Bounds) -> None:
+    """Refuse what is not a rectangle within MAX_COORDINATE. Raises SettingError."""
+    numbers = all(isinstance(b, int | float) and not isinstance(b, bool) and abs(b) <= MAX_COORDINATE for b in bounds)
     if not (numbers and bounds[0] <= bounds[2] and bounds[1] <= bounds[3]):
-        raise InputError(f"{name} is {tuple(bounds)!r}; give x and y of its lower left and upper right corner (m)")
+        raise SettingError(f"{label} is {tuple(bounds)!r}; give x and y of its lower left and upper right corner (m)")
 
 
 @dataclass(frozen=True)
 class Ground:
-    """A flat rectangle of one colour at z = 0."""
+    """A flat rectangle at z = 0.
+
+    Attributes:
+        rgb: Its colour.
+        bounds: Where it is (m).
+    """
 
     rgb: RGB
     bounds: Bounds
 
+    def __post_init__(self):
+        check_colour("the colour of the ground", self.rgb)
+        check_bounds("the ground", self.bounds)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class World:
-    """Everything there is to see, immutable.
+    """Everything that can be seen. Immutable.
 
-    triangles: (n, 3, 3) corners in metres (triangle, corner, xyz), z up, ground at z = 0.
-    rgb: (n, 3) one colour a triangle.
-    field: where an agent may stand.
-    double_sided: False culls back faces: a triangle is seen only from the side (v1 - v0) x (v2 - v0) points to.
-    origin: how the world was made (preset, seed, parameters), kept through saving and loading.
-    textured: the meshes as read, where they carry textures; the GL renderers draw these.
+    Attributes:
+        triangles: (n, 3, 3) corners: triangle, corner, xyz (m, z up, ground at z = 0).
+        rgb: (n, 3) one colour per triangle.
+        ground: The ground, or None.
+        sky_rgb: Colour of the sky.
+        field: Where an agent may be (m).
+        double_sided: False culls back faces: a triangle is visible only from the side that (v1 - v0) x (v2 - v0) points to.
+        origin: How the world was made (preset, seed, parameters); it is saved and loaded with the world.
+        textured: The meshes of the file, where they have textures; the GL renderers draw these.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -60,44 +70,54 @@ class World:
     textured: tuple[Any, ...] = ()
 
     def __post_init__(self):
-        for name, shape, kind in (
-            ("triangles", (len(self.triangles), 3, 3), np.float32),
-            ("rgb", (len(self.triangles), 3), np.uint8),
-        ):
-            array = getattr(self, name)
+        n = len(self.triangles)
+        for label, shape, kind in (("triangles", (n, 3, 3), np.float32), ("rgb", (n, 3), np.uint8)):
+            array = getattr(self, label)
             if array.shape != shape or array.dtype != kind:
-                raise InputError(f"{name} of a world are {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
-            object.__setattr__(self, name, array.copy())
-        near = np.abs(self.triangles) <= FARTHEST  # False for nan, too
-        if not near.all():
-            bad = int(near.all(axis=(1, 2)).argmin())
-            raise InputError(
-                f"triangle {bad} of the world has a corner that is not finite, or over {FARTHEST:g} m away; repair the mesh"
+                raise SettingError(f"{label} of a world are {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
+            array = array.copy()
+            array.flags.writeable = False
+            object.__setattr__(self, label, array)
+        valid = np.abs(self.triangles) <= MAX_COORDINATE  # False for nan
+        if not valid.all():
+            invalid = int(valid.all(axis=(1, 2)).argmin())
+            raise SettingError(
+                f"triangle {invalid} of the world has a corner that is not finite, or over {MAX_COORDINATE:g} m away; repair the mesh"
             )
-        check_colour("the sky's colour", self.sky_rgb)
+        check_colour("the colour of the sky", self.sky_rgb)
         check_bounds("the field", self.field)
-        if self.ground is not None:
-            check_colour("the ground's colour", self.ground.rgb)
-            check_bounds("the ground", self.ground.bounds)
-        self.triangles.flags.writeable = False
-        self.rgb.flags.writeable = False
 
     @classmethod
-    def generate(cls, params: "WorldParams | str" = "tussock-field", seed: int = 0) -> "World":
-        """Grow a world from parameters, or from a preset by its name, which parameters may follow (see `WorldParams.named`).
+    def generate(cls, params: WorldParams | str = "tussock-field", seed: int = 0) -> "World":
+        """Generate a world. The same arguments give the same bytes.
 
-        The same seed gives the same bytes. Raises InputError for an unknown preset (lists the known) or a seed that is no whole
-        number from 0.
+        Args:
+            params: Parameters, or the name of a preset, which parameters may follow: "tussock-field field_width=20". A preset
+                of your own is named as `package.module:name`, or registered.
+            seed: A whole number from 0.
+
+        Raises:
+            SettingError: For an unknown preset or parameter, an invalid value, or an invalid seed.
         """
-        from .generate import generate_world
-        from .params import WorldParams
-
-        if isinstance(params, str):
-            params = WorldParams.named(params)
-        return generate_world(params, seed)
+        made = WORLDS.spec(params).make(seed=seed) if isinstance(params, str) else params
+        if isinstance(made, World):
+            return made
+        if not isinstance(made, WorldParams):
+            raise SettingError(
+                f"the world {params!r} gives an object of type {type(made).__name__}; a preset returns WorldParams or a World"
+            )
+        triangles, rgb = generate_plants(made, seed)
+        return cls(
+            triangles=triangles,
+            rgb=rgb,
+            ground=Ground(made.ground_rgb, made.field.widened(made.ground_margin)),
+            sky_rgb=made.sky_rgb,
+            field=made.field,
+            origin={"generator": GENERATOR, "preset": preset_of(made), "seed": int(seed), "params": made.to_dict()},
+        )
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
-        """Triangles and colours with the ground's two triangles (facing up) appended: what a renderer draws."""
+        """Triangles and colours, with the two triangles of the ground (facing up) at the end: what a renderer draws."""
         if self.ground is None:
             return self.triangles, self.rgb
         x0, y0, x1, y1 = self.ground.bounds

@@ -1,15 +1,14 @@
-"""Settings that check themselves: fields with a range and a unit, for attrs classes.
+"""Settings that check themselves: fields with a unit and a range, for attrs classes.
 
     @settings
     class Body:
         step_length: float = number(0.05, above=0, unit="m")
 
-A value outside its range raises `SettingError` where the settings are made, whoever makes them: a script, the command line
-or a sweep file. A tool can read the range and unit of a field: `describe(Body)`.
+An invalid value raises `SettingError` where the settings are made: in a script, by the command line or from a sweep file.
+`describe(Body)` gives the default, unit and range of every field.
 
-attrs does the work: it checks when an object is made and when it is changed, keeps values as they are, takes arrays and any
-other class as a value, and comes with rerun-sdk already. pydantic would convert values by rules of its own, and msgspec
-checks only what it decodes.
+Why attrs: it checks an object when it is made and when it is changed, accepts arrays and objects of any class as values, and
+rerun-sdk requires it anyway. pydantic would convert values by rules of its own; msgspec checks only what it decodes.
 """
 
 import math
@@ -22,47 +21,86 @@ import attrs
 from .errors import SettingError
 
 T = TypeVar("T")
+RGB = tuple[int, int, int]
+MAX_WHOLE = 2**62  # what an int64 holds, with room to add; errors do not mention it
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(attrs.field,))
+def converted(*, default: Any, converter: Callable[..., Any], takes_self: bool = False) -> Any:
+    """A field whose value is made by a converter, which raises SettingError for an invalid one.
+
+    Args:
+        default: Value that is converted where none is given.
+        converter: Makes the value of the field.
+        takes_self: Whether the converter also gets the object, with the fields before this one.
+    """
+    convert = attrs.Converter(converter, takes_self=True) if takes_self else converter
+    return attrs.field(default=default, converter=convert)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(attrs.field, converted))
 def settings(cls: type[T]) -> type[T]:
-    """Class decorator: a frozen class of keyword fields, which are checked when it is made."""
+    """Class decorator: a frozen class of keyword fields, which are checked when an object is made."""
     return attrs.frozen(kw_only=True, slots=False)(cls)
 
 
 def number(
-    default: Any = attrs.NOTHING, *, low: float = -math.inf, high: float = math.inf, above: float | None = None,
-    below: float | None = None, unit: str = "", optional: bool = False, names: Collection[str] = (),
-) -> Any:  # fmt: skip
+    default: Any = attrs.NOTHING,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    above: float = -math.inf,
+    below: float = math.inf,
+    unit: str = "",
+    optional: bool = False,
+    names: Collection[str] = (),
+) -> Any:
     """A field for a finite number.
 
-    low, high: the range, both ends allowed. above, below: the range, the end not allowed.
-    unit: of the number; a "rad" is also reported in degrees. optional: None is allowed.
-    names: texts that are allowed in place of a number.
+    Args:
+        default: Value of the field; none makes it a required one.
+        low: Minimum, allowed itself.
+        high: Maximum, allowed itself.
+        above: Lower limit, not allowed itself.
+        below: Upper limit, not allowed itself.
+        unit: Unit of the number. Errors report "rad" in degrees as well.
+        optional: Whether None is allowed.
+        names: Texts that are allowed in place of a number.
     """
-    limits = _Limits(Real, low, high, above, below)
-    return _field(default, limits, unit, optional, names)
+    return _single(default, _Range(float, low, high, above, below, unit), optional, names)
 
 
 def whole(
-    default: Any = attrs.NOTHING, *, low: float = 1, high: float = 2**62, unit: str = "", optional: bool = False
+    default: Any = attrs.NOTHING, *, low: float = 1, high: float = MAX_WHOLE, unit: str = "", optional: bool = False
 ) -> Any:
-    """A field for a whole number from `low` to `high`, both allowed. optional: None is allowed."""
-    return _field(default, _Limits(Integral, low, high, None, None), unit, optional, ())
+    """A field for a whole number from `low` to `high`, both allowed. For the other arguments see `number`."""
+    return _single(default, _Range(int, low, high, unit=unit), optional, ())
 
 
 def numbers(
     default: tuple[float, ...], *, low: float = -math.inf, high: float = math.inf, unit: str = "", single: bool = False
 ) -> Any:
-    """A field for a tuple of at least one number. single: one number that stands alone is allowed as well."""
-    return _several(default, _Limits(Real, low, high, None, None), unit, single)
+    """A field for a tuple of at least one number.
+
+    Args:
+        default: Value of the field.
+        low: Minimum of each number.
+        high: Maximum of each number.
+        unit: Unit of the numbers.
+        single: Whether a number alone is allowed as well.
+    """
+    return _several(default, _Range(float, low, high, unit=unit), single)
 
 
 def wholes(
-    default: tuple[int, ...], *, low: float = 1, high: float = 2**62, unit: str = "", single: bool = False
+    default: tuple[int, ...], *, low: float = 1, high: float = MAX_WHOLE, unit: str = "", single: bool = False
 ) -> Any:
-    """A field for a tuple of at least one whole number. single: one number that stands alone is allowed as well."""
-    return _several(default, _Limits(Integral, low, high, None, None), unit, single)
+    """A field for a tuple of at least one whole number. For the arguments see `numbers`."""
+    return _several(default, _Range(int, low, high, unit=unit), single)
+
+
+def colour(default: RGB) -> Any:
+    """A field for a colour: red, green and blue, each a whole number from 0 to 255."""
+    return _several(default, _Range(int, 0, 255), False, count=3)
 
 
 def choice(default: str, names: Iterable[str]) -> Any:
@@ -70,18 +108,18 @@ def choice(default: str, names: Iterable[str]) -> Any:
     known = tuple(names)
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
-        if value not in known:
+        if not (isinstance(value, str) and value in known):
             refuse(instance, attribute, value, f"one of {', '.join(known)}")
 
     return attrs.field(default=default, validator=check, metadata={"choices": known})
 
 
 def text(default: Any = attrs.NOTHING, *, optional: bool = False) -> Any:
-    """A field for a text that can be printed. optional: None is allowed."""
+    """A field for a printable text. optional: Whether None is allowed."""
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
         if not ((optional and value is None) or (isinstance(value, str) and value.isprintable())):
-            refuse(instance, attribute, value, "a text that can be printed")
+            refuse(instance, attribute, value, "a printable text" + " or None" * optional)
 
     return attrs.field(default=default, validator=check)
 
@@ -92,7 +130,14 @@ def switch(default: bool) -> Any:
 
 
 def instance_of(kinds: Any, default: Any, wanted: str, *, converter: Callable[[Any], Any] | None = None) -> Any:
-    """A field for an object of some class. wanted: what it should be, in words. converter: applied before the check."""
+    """A field for an object of a class.
+
+    Args:
+        kinds: The class, or several, as for isinstance.
+        default: Value of the field.
+        wanted: What to give, for the error.
+        converter: Applied to a value before it is checked.
+    """
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
         if not isinstance(value, kinds):
@@ -102,80 +147,89 @@ def instance_of(kinds: Any, default: Any, wanted: str, *, converter: Callable[[A
 
 
 def describe(cls: type) -> dict[str, dict[str, Any]]:
-    """Default, unit and range of every field of a settings class, by name."""
+    """Default, unit, and range or choices of every field of a settings class, by name."""
     return {each.name: {"default": each.default} | dict(each.metadata) for each in attrs.fields(cls)}
 
 
 def refuse(instance: Any, attribute: attrs.Attribute, value: Any, wanted: str) -> None:
-    """Raise SettingError for a value: what was given, and what is wanted."""
+    """Raise SettingError for a value.
+
+    Args:
+        instance: The object that is made; its class is called by its attribute `name` where it has one.
+        attribute: The field.
+        value: What was given.
+        wanted: What to give instead.
+    """
     label = getattr(type(instance), "name", "") or type(instance).__name__
     raise SettingError(f"{label}: {attribute.name} is {shown(value, attribute.metadata)}; give {wanted}")
 
 
 def shown(value: Any, metadata: Mapping[str, Any]) -> str:
     """A value as an error reports it: an angle in degrees as well."""
-    if metadata.get("unit") == "rad" and isinstance(value, Real) and not isinstance(value, bool):
-        return f"{value:g} rad ({math.degrees(float(value)):g} degrees)"
+    if metadata.get("unit") == "rad" and isinstance(value, float):
+        return f"{value:g} rad ({math.degrees(value):g} degrees)"
     return repr(value)
 
 
-class _Limits:
-    """A kind of number and its range."""
+@attrs.frozen
+class _Range:
+    """Numbers of one kind (int or float) between limits, of which `above` and `below` are not allowed themselves."""
 
-    def __init__(self, kind: type, low: float, high: float, above: float | None, below: float | None):
-        self.kind, self.low, self.high, self.above, self.below = kind, low, high, above, below
-
-    def allow(self, value: Any) -> bool:
-        if isinstance(value, bool) or not isinstance(value, self.kind) or not math.isfinite(value):
-            return False
-        inside = self.low <= value <= self.high
-        return inside and (self.above is None or value > self.above) and (self.below is None or value < self.below)
+    kind: type
+    low: float
+    high: float
+    above: float = -math.inf
+    below: float = math.inf
+    unit: str = ""
 
     def convert(self, value: Any) -> Any:
-        """A number as Python's own type; anything else as it is."""
-        if isinstance(value, bool) or not isinstance(value, self.kind):
+        """A number as an int or float; anything else unchanged."""
+        if isinstance(value, bool) or not isinstance(value, Integral if self.kind is int else Real):
             return value
-        return int(value) if self.kind is Integral else float(value)  # type: ignore[arg-type]
+        try:
+            return self.kind(value)  # type: ignore[arg-type]
+        except OverflowError:
+            return value
 
-    def wanted(self, unit: str) -> str:
-        parts = ["a whole number" if self.kind is Integral else "a number"]
-        low = f"over {self.above:g}" if self.above is not None else f"from {self.low:g}" if self.low > -math.inf else ""
-        bounded = self.high < math.inf and not (self.kind is Integral and self.high >= 2**62)
-        high = f"under {self.below:g}" if self.below is not None else f"to {self.high:g}" if bounded else ""
-        parts += [part for part in (low, high) if part]
-        return " ".join(parts) + (f" ({unit})" if unit else "")
+    def __contains__(self, value: Any) -> bool:
+        if isinstance(value, bool) or not isinstance(value, self.kind):
+            return False
+        return self.low <= value <= self.high and self.above < value < self.below  # never nan or infinite
+
+    def __str__(self) -> str:
+        low = f"over {self.above:g}" if self.above > -math.inf else f"from {self.low:g}" if self.low > -math.inf else ""
+        largest = MAX_WHOLE if self.kind is int else math.inf
+        high = f"under {self.below:g}" if self.below < math.inf else f"to {self.high:g}" if self.high < largest else ""
+        words = ["whole number" if self.kind is int else "number", low, high, f"({self.unit})" if self.unit else ""]
+        return " ".join(filter(None, words))
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Unit and limits, for `describe`."""
+        return {"unit": self.unit, "low": max(self.low, self.above), "high": min(self.high, self.below)}
 
 
-def _field(default: Any, limits: _Limits, unit: str, optional: bool, names: Collection[str]) -> Any:
-    def convert(value: Any) -> Any:
-        return limits.convert(value)
-
-    def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
-        if (optional and value is None) or (isinstance(value, str) and value in names) or limits.allow(value):
-            return
-        others = [f"one of {', '.join(names)}"] * bool(names) + ["None"] * optional
-        refuse(instance, attribute, value, " or ".join([limits.wanted(unit), *others]))
-
-    return attrs.field(default=default, converter=convert, validator=check, metadata=_metadata(limits, unit))
-
-
-def _several(default: tuple, limits: _Limits, unit: str, single: bool) -> Any:
-    def convert(value: Any) -> Any:
-        if isinstance(value, list | tuple):
-            return tuple(map(limits.convert, value))
-        return limits.convert(value)
+def _single(default: Any, allowed: _Range, optional: bool, names: Collection[str]) -> Any:
+    """A field for one number."""
+    others = [f"one of {', '.join(names)}"] * bool(names) + ["None"] * optional
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
-        if single and limits.allow(value):
-            return
-        if not (isinstance(value, tuple) and value and all(map(limits.allow, value))):
-            refuse(
-                instance, attribute, value, f"at least one {limits.wanted(unit).removeprefix('a ')}, as in {default!r}"
-            )
+        if not (value in allowed or (optional and value is None) or (isinstance(value, str) and value in names)):
+            refuse(instance, attribute, value, " or ".join([f"a {allowed}", *others]))
 
-    return attrs.field(default=default, converter=convert, validator=check, metadata=_metadata(limits, unit))
+    return attrs.field(default=default, converter=allowed.convert, validator=check, metadata=allowed.metadata)
 
 
-def _metadata(limits: _Limits, unit: str) -> dict[str, Any]:
-    low, high = (a if b is None else b for a, b in ((limits.low, limits.above), (limits.high, limits.below)))
-    return {"unit": unit, "low": low, "high": high}
+def _several(default: tuple, allowed: _Range, single: bool, count: int | None = None) -> Any:
+    """A field for a tuple of numbers: `count` of them, or at least one."""
+    wanted = f"{count} {str(allowed).replace('number', 'numbers')}" if count else f"at least one {allowed}"
+
+    def convert(value: Any) -> Any:
+        return tuple(map(allowed.convert, value)) if isinstance(value, list | tuple) else allowed.convert(value)
+
+    def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
+        several = isinstance(value, tuple) and len(value) > 0 and all(each in allowed for each in value)
+        if not ((several and count in (None, len(value))) or (single and value in allowed)):
+            refuse(instance, attribute, value, f"{wanted}, as in {default!r}")
+
+    return attrs.field(default=default, converter=convert, validator=check, metadata=allowed.metadata)

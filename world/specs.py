@@ -1,6 +1,6 @@
 """Specs: a name and its parameters as one text, such as `mushroom-body inputs=10 cells=20000`.
 
-Models, navigators and generated worlds are named so on the command line, in sweep files and in tables.
+Models, navigators and generated worlds are written like this on the command line, in sweep files and in tables.
 """
 
 import inspect
@@ -11,18 +11,19 @@ from typing import Any
 
 from .errors import SettingError
 
-RESERVED = ("seed", "device", "model")  # never part of a spec: an experiment gives them
+RESERVED = ("seed", "device", "model")  # never part of a spec: the experiment decides them
 CONSTANTS = {"true": True, "false": False, "none": None}
+KEYWORDS = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
 @dataclass(frozen=True)
 class Spec:
-    """What a spec names, not made yet.
+    """A class or function with parameters; the object is not made yet.
 
     Attributes:
-        name: As people write it.
-        target: Class or function that makes it.
-        parameters: Those that are not the defaults of the target.
+        name: Name of the target.
+        target: Class or function that makes the object.
+        parameters: Those that differ from the defaults of the target.
     """
 
     name: str
@@ -39,10 +40,19 @@ class Spec:
         return cls(name, target, {key: value for key, value in given.items() if value != defaults[key]})
 
     def make(self, **more: Any) -> Any:
-        """The object. more: further parameters, such as the seed; one that the target does not take is left out if it is reserved."""
-        taken = inspect.signature(self.target).parameters
-        anything = any(each.kind is each.VAR_KEYWORD for each in taken.values())
-        given = {key: value for key, value in more.items() if anything or key in taken or key not in RESERVED}
+        """The object.
+
+        Args:
+            **more: Other parameters; a reserved one, such as the seed, is left out if the target does not take it.
+
+        Raises:
+            SettingError: Where a parameter without a default is missing, or one is unknown or given twice.
+        """
+        given = {key: value for key, value in more.items() if key not in RESERVED or _takes(self.target, key)}
+        try:
+            inspect.signature(self.target).bind(**self.parameters, **given)
+        except TypeError as error:
+            raise SettingError(f"{str(self)!r} cannot be made ({error}); give its parameters as name=value") from error
         return self.target(**self.parameters, **given)
 
     def __str__(self) -> str:
@@ -50,12 +60,21 @@ class Spec:
 
 
 def parse_spec(text: str, find: Callable[[str], Callable[..., Any]]) -> Spec:
-    """The spec that a text holds. find: the class or function of a name.
+    """The spec that a text holds.
 
-    Raises SettingError for an empty text, and for parameters that the target does not have.
+    Args:
+        text: A name, and parameters as `name=value`, separated by spaces.
+        find: Gives the class or function of a name.
+
+    Raises:
+        SettingError: For an unknown name, and for a parameter that the target does not have.
     """
     name, *words = split_words(text) or [""]
     target = find(name)
+    if not callable(target):
+        raise SettingError(
+            f"{name!r} is of type {type(target).__name__}, not a class or function; name one that makes it"
+        )
     parameters = parse_parameters(words, name, target)
     defaults = own_parameters(target)
     return Spec(name, target, {key: value for key, value in parameters.items() if value != defaults.get(key, ...)})
@@ -66,7 +85,7 @@ def own_parameters(target: Callable[..., Any]) -> dict[str, Any]:
     return {
         name: None if each.default is each.empty else each.default
         for name, each in inspect.signature(target).parameters.items()
-        if name not in RESERVED and each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)
+        if name not in RESERVED and each.kind in KEYWORDS
     }
 
 
@@ -81,12 +100,17 @@ def split_list(text: str) -> list[str]:
 
 
 def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) -> dict[str, Any]:
-    """The parameters that words such as `rate=0.1` give. Raises SettingError where the target has no such parameter.
+    """The parameters that words such as `rate=0.1` give. Their values are checked where the object is made.
 
-    Whether a value makes sense is checked where the object is made. name: for messages.
+    Args:
+        words: Parameters as `name=value`.
+        name: Name of the target, for messages.
+        target: Class or function whose parameters they are.
+
+    Raises:
+        SettingError: For a parameter that the target does not have, and for one that is given twice.
     """
     own = own_parameters(target)
-    anything = any(each.kind is each.VAR_KEYWORD for each in inspect.signature(target).parameters.values())
     parameters = {}
     for word in words:
         key, _, value = word.partition("=")
@@ -94,7 +118,7 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
             raise SettingError(f"{word!r} is not a parameter; give name=value, without spaces")
         if key in RESERVED:
             raise SettingError(f"{key} cannot be part of {name!r}; give it as --{key}, in Python as {key}=")
-        if key not in own and not anything:
+        if not _takes(target, key):
             raise SettingError(f"{name} has no parameter {key!r}; its parameters are {', '.join(own) or 'none'}")
         if key in parameters:
             raise SettingError(f"{key} is given twice; give it once")
@@ -103,13 +127,16 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
 
 
 def parse_value(text: str, default: Any) -> Any:
-    """The value that a text holds for a parameter with this default: one, or several as in `100,50` or `(100,50)`.
+    """The value that a text holds: one, or several as in `100,50` or `(100,50)`.
 
-    Where the default is a tuple, a single value becomes a tuple of one.
+    Args:
+        text: The value.
+        default: Default of the parameter. Where it is a tuple, a single value becomes a tuple of one; where it is neither a
+            whole number nor None, numbers are read as float.
     """
     several = isinstance(default, tuple)
-    usual = default[0] if several and default else default
-    whole = usual is None or isinstance(usual, int)
+    example = default[0] if several and default else default
+    whole = example is None or isinstance(example, int)
     bare = text[1:-1] if text.startswith("(") and text.endswith(")") else text
     if several or "," in text or bare != text:
         parts = bare.strip().removesuffix(",")
@@ -118,7 +145,7 @@ def parse_value(text: str, default: Any) -> Any:
 
 
 def parse_single(text: str, whole: bool) -> Any:
-    """The number (a whole one if `whole` and possible), the constant or the text that a text holds."""
+    """The number (an int if `whole` and possible), the constant or the text that a text holds."""
     if whole and re.fullmatch(r"[+-]?\d{1,18}", text):
         return int(text)
     try:
@@ -137,3 +164,9 @@ def format_value(value: Any) -> str:
     if isinstance(value, tuple | list):
         return f"({','.join(map(format_value, value))})"
     return str(value).lower() if value is None or isinstance(value, bool) else str(value)
+
+
+def _takes(target: Callable[..., Any], name: str) -> bool:
+    """Whether a class or function takes a keyword."""
+    taken = inspect.signature(target).parameters.values()
+    return any(each.kind is each.VAR_KEYWORD or (each.name == name and each.kind in KEYWORDS) for each in taken)

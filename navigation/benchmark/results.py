@@ -142,9 +142,10 @@ def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
 def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
     """The line of a run, from its results by name."""
     settings = settings_of(experiment)
-    asked = {name: settings[name] for name in ASKED}
-    names = [each.name for each in attrs.fields(Line) if each.name not in ASKED]
-    return Line(**asked, **{name: results.get(name) for name in names} | {"arrived": bool(results.get("arrived"))})
+    values: dict[str, Any] = {name: settings[name] for name in ASKED}
+    values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in ASKED}
+    values["arrived"] = bool(values["arrived"])
+    return Line(**values)
 
 
 def result_of(
@@ -217,8 +218,11 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
         if not lines:
             raise ValueError("no runs")
         times = {name: float(seconds) for name, seconds in content["times"].items()}
-        rest = {name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")}
-        result = Result(**rest | {"encoding": current_encoding(rest["encoding"])}, runs=lines, times=times)
+        rest: dict[str, Any] = {
+            name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")
+        }
+        rest["encoding"] = current_encoding(rest["encoding"])
+        result = Result(**rest, runs=lines, times=times)
         scores = json.loads(json.dumps(result.scores()))
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError) as error:
         raise FileError(f"{path} is not a result of tussock benchmark ({error!r}); make it again") from error
@@ -238,7 +242,7 @@ def current_encoding(encoding: str) -> str:
 
 
 def _check_runs(path: Path, result: Result, benchmark: Benchmark) -> None:
-    asked = benchmark.asked()
+    asked = [tuple(settings_of(run)[name] for name in ASKED) for runs in benchmark.by_world() for run in runs]
     if [run.asked for run in result.runs] != asked:
         raise FileError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
 

@@ -17,7 +17,7 @@ from .worlds import numbers
 
 if TYPE_CHECKING:
     from tussock.render.images.writing import Grid
-    from tussock.render.renderer import Poses
+    from tussock.render.poses import Poses
     from tussock.world.geometry import Bounds
     from tussock.world.scene import World
 
@@ -53,13 +53,13 @@ class DatabaseGridCommand(ViewOptions):
 
     def grid(self, field: "Bounds", low: tuple[float, ...] | None, high: tuple[float, ...] | None) -> "Grid":
         """The grid from one corner to the other (m), each by default the published grid's or the field's."""
-        from tussock.render.images.writing import Grid, published_part
+        from tussock.render.images.writing import Grid, published_grid_area
         from tussock.world.geometry import Bounds
 
         for flag, corner in (("--from-m", low), ("--to-m", high)):
             if corner is not None and not field.contains(*corner):
                 raise SettingError(f"{flag} {corner[0]:g},{corner[1]:g}: that is outside the world ({field})")
-        usual = published_part(field)
+        usual = published_grid_area(field)
         return Grid.over(Bounds(*(low or usual[:2]), *(high or usual[2:])), self.spacing_m)
 
 

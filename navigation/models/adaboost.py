@@ -2,13 +2,14 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import NamedTuple, no_type_check
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import torch
 from jaxtyping import Float32, Float64, UInt8
 
+from tussock.render.compile import compiled
 from tussock.world.geometry import columns_of_turn
 
 from .base import Images, Learned, Model, Scans
@@ -156,8 +157,7 @@ def best_stump(bins: UInt8[np.ndarray, "pool samples"], signed: Float64[np.ndarr
     return Stump(best, int(cuts[best]), sign, float((1 - edge) / 2))
 
 
-@no_type_check  # or the tests' type checker would wrap it before numba compiles it
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _edges(bins, heavy, signed):
     """For each filter the threshold whose edge, sum of weight x label x answer, is the farthest from 0, and that edge."""
     pool, samples = len(bins), len(heavy)

@@ -1,11 +1,11 @@
 """Trained models on disk: safetensors, with a JSON header that says what they are. Nothing in such a file is ever run."""
 
-import dataclasses
 import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import attrs
 import numpy as np
 import safetensors
 import torch
@@ -49,7 +49,7 @@ def save_model(
     device_free = {key: value for key, value in model.parameters.items() if key != "device"}
     header = {
         "version": VERSION, "model": model.name, "parameters": device_free, "shape": model.shape,
-        "encoding": None if encoding is None else str(encoding), "eye": None if eye is None else dataclasses.asdict(eye),
+        "encoding": None if encoding is None else str(encoding), "eye": None if eye is None else attrs.asdict(eye),
     }  # fmt: skip
     tensors = {f"learned.{key}": tensor.detach().cpu().contiguous() for key, tensor in model.learned.items()}
     if poses is not None:

@@ -1,11 +1,10 @@
 """Perfect memory: every view of the route is kept, and the nearest is recognised."""
 
-from typing import no_type_check
-
-import numba
 import numpy as np
 import torch
 from jaxtyping import Float32, Int64
+
+from tussock.render.compile import compiled
 
 from .base import Images, IncrementalModel, Learned, Scans, check_scan
 from .filter_bank import FilterBank, all_rotations, in_parts
@@ -82,8 +81,7 @@ def energies(images: Images) -> Float32[np.ndarray, " n"]:
     return np.concatenate(parts)
 
 
-@no_type_check  # or the tests' type checker would wrap it before numba compiles it
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _nearer(even, odd, first, last, squared, index):
     """Where one of the snapshots first .. last - 1 is nearer than squared (n, w) says, change that, and index (n, w) to it.
 
@@ -117,16 +115,14 @@ def _nearer_on_device(
     squared[nearer], index[nearer] = values[nearer], first + which[nearer]
 
 
-@no_type_check
-@numba.njit(nogil=True, cache=True, inline="always")
+@compiled(inline="always")
 def _order(x):
     """A whole number that is the greater the greater a float32 is: of these, unlike of floats, many are compared at once."""
     bits = np.float32(x).view(np.int32)
     return bits ^ (bits >> 31 & 0x7FFFFFFF)
 
 
-@no_type_check
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _least(even, odd, sign):
     """The least of even + sign odd, in `_order`."""
     least = np.int32(0x7FFFFFFF)
@@ -135,8 +131,7 @@ def _least(even, odd, sign):
     return least
 
 
-@no_type_check
-@numba.njit(nogil=True, cache=True, fastmath={"reassoc"})
+@compiled(fastmath={"reassoc"})
 def _rescore(views, snapshots, index, tolerance, squared):
     """Make the squared distances (n, w) exact that rounding leaves in doubt about being their view's least, and their neighbours."""
     n, height, width = views.shape

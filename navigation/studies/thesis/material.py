@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.render.eye import Eye
-from tussock.render.images.check import other_convention
+from tussock.render.images.check import heading_convention_error
 from tussock.render.images.database import read_database
-from tussock.render.images.files import as_kept
-from tussock.render.images.writing import Grid, published_part
+from tussock.render.images.entries import stored_poses
+from tussock.render.images.writing import Grid, published_grid_area
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError
 from tussock.world.geometry import Route
@@ -78,9 +78,9 @@ def material_of_world(
     world: World, route: Route, eye: Eye | None = None, *, backend: str = "auto", spacing: float = ROUTE_SPACING
 ) -> Material:  # fmt: skip
     """Draw the views along a route and at the grid beside it, at the poses that a database of them would hold."""
-    views = Route(as_kept(route.resampled(spacing).poses))
-    part = published_part(world.field)
-    every = as_kept(Grid.over(part if part.contains(*route.xy.T).all() else world.field, GRID).poses())
+    views = Route(stored_poses(route.resampled(spacing).poses))
+    part = published_grid_area(world.field)
+    every = stored_poses(Grid.over(part if part.contains(*route.xy.T).all() else world.field, GRID).poses())
     places = every[views.nearest(every[:, :2])[0] <= BESIDE]
     check_enough(views, places)
     with open_renderer(world, eye, backend) as renderer:
@@ -104,7 +104,7 @@ def material_of_databases(grid: Path, route: Path) -> Material:
     views = Route(route_database.poses)
     if len(views.poses) < len(route_database.poses):
         raise InputError(f"{route}: two views in a row stand at one place; a study needs them apart")
-    if meant := other_convention(views.poses):
+    if meant := heading_convention_error(views.poses):
         raise InputError(f"{route}: {meant}; a study measures against them")
     rows = np.flatnonzero(views.nearest(grid_database.poses[:, :2])[0] <= BESIDE)
     places = grid_database.poses[rows]
