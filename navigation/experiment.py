@@ -257,3 +257,16 @@ class Trained:
 def automatic_resize(eye: Eye) -> float:
     """The factor by which a preset encoding reduces the views of an eye."""
     return max(1.0, eye.width / FINE_WIDTH)
+
+
+def describe_encoding(encoding: "Encoding", eye: Eye) -> tuple[str, float | None, float]:
+    """An encoding in short: a preset's name, its resize (None: automatic) and blur; else the whole chain."""
+    from .encoding import PRESETS, Encoding
+    from .encoding_steps import Blur, Resize
+
+    blur = next((step.sigma for step in encoding.steps if isinstance(step, Blur)), 0.0)
+    resize = next((step.factor for step in encoding.steps if isinstance(step, Resize)), 1.0)
+    for name in PRESETS:
+        if Encoding.named(name, resize=resize, blur=blur) == encoding:
+            return name, None if resize == automatic_resize(eye) else resize, blur
+    return str(encoding), None, 0.0

@@ -15,11 +15,13 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import attrs
+
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
 
 from .body import Body
-from .experiment import MODEL_SUFFIX, Experiment, automatic_resize
+from .experiment import MODEL_SUFFIX, Experiment, automatic_resize, describe_encoding
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .training_setup import TrainingSetup
@@ -75,12 +77,6 @@ def surroundings_of(settings: Mapping[str, Any]) -> Surroundings:
     return Surroundings(**_surroundings(_given(settings), None))
 
 
-def encoding_of(settings: Mapping[str, Any]) -> "Encoding":
-    """The encoding that settings describe."""
-    given = _given(settings)
-    return _encoding(given, _eye(given, None), None)
-
-
 def settings_of(experiment: Experiment) -> dict[str, Any]:
     """The settings that describe an experiment, by the names of TYPES; those that follow from others are None."""
     eye, training, body, stopping = experiment.eye, experiment.training, experiment.body, experiment.stopping
@@ -89,7 +85,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     scans = navigator.name == "scan"
     width, about = (parameters.pop("width", math.pi), parameters.pop("about", None)) if scans else (None, None)
     return {
-        "world": str(experiment.world) if isinstance(experiment.world, str | Path) else "a world in memory",
+        "world": _source(experiment.world, "world"),
         "world_seed": experiment.world_seed,
         "seed": experiment.seed,
         "size": f"{eye.width}x{eye.height}",
@@ -99,7 +95,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "top_deg": degrees(eye.top),
         "bottom_deg": degrees(eye.bottom),
         "cull_back_faces": experiment.cull_back_faces,
-        "route": None if experiment.route is None else str(experiment.route),
+        "route": None if experiment.route is None else _source(experiment.route, "route"),
         "route_seed": experiment.route_seed,
         "route_length_m": experiment.route_length,
         "encoding": encoding,
@@ -136,10 +132,10 @@ def run_command(experiment: Experiment, out: str) -> str:
     """The command that does the run of an experiment alone, to the last bit."""
     defaults, words = default_settings(), []
     for name, value in settings_of(experiment).items():
-        if value != defaults[name]:
+        if value is not None and value != defaults[name]:
             flag = f"--{name.replace('_', '-')}"
             words += [flag] if value is True else [flag, str(value)]
-    return f"tussock run {shlex.join(words)} --out {shlex.quote(out)}"
+    return shlex.join(["tussock", "run", *words, "--out", out])
 
 
 def key_of(experiment: Experiment) -> str:
@@ -158,21 +154,10 @@ def training_key(experiment: Experiment) -> str:
 
 
 def degrees(angle: float) -> float:
-    """An angle (rad) in degrees, without the rounding of the way there and back."""
-    return round(math.degrees(angle), 9)
-
-
-def describe_encoding(encoding: "Encoding", eye: Eye) -> tuple[str, float | None, float]:
-    """An encoding in short: a preset's name, its resize (None: automatic) and blur; else the whole chain."""
-    from .encoding import PRESETS, Encoding
-    from .encoding_steps import Blur, Resize
-
-    blur = next((step.sigma for step in encoding.steps if isinstance(step, Blur)), 0.0)
-    resize = next((step.factor for step in encoding.steps if isinstance(step, Resize)), 1.0)
-    for name in PRESETS:
-        if Encoding.named(name, resize=resize, blur=blur) == encoding:
-            return name, None if resize == automatic_resize(eye) else resize, blur
-    return str(encoding), None, 0.0
+    """An angle (rad) in degrees: the number that was given, where it was given in degrees."""
+    value = math.degrees(angle)
+    candidates = (round(value, 9), value, math.nextafter(value, math.inf), math.nextafter(value, -math.inf))
+    return next((each for each in candidates if math.radians(each) == angle), value)
 
 
 def _values(given: Mapping[str, Any], **names: str) -> dict[str, Any]:
@@ -238,7 +223,7 @@ def _encoding(given: Mapping[str, Any], eye: Eye, trained: "TrainedModel | None"
     said = [name for name in ("encoding", "resize", "blur") if given.get(name)]
     if known is not None and not said:
         return known
-    name = given.get("encoding", "edges")
+    name = given.get("encoding", attrs.fields(Experiment).encoding.default)
     automatic = automatic_resize(eye) if name in PRESETS else 1.0
     encoding = Encoding.named(name, resize=given.get("resize", automatic), blur=given.get("blur", 0.0))
     if known is not None and encoding != known:
@@ -252,7 +237,7 @@ def _encoding(given: Mapping[str, Any], eye: Eye, trained: "TrainedModel | None"
 def _navigator(given: Mapping[str, Any]) -> Any:
     from .steering import NAVIGATORS
 
-    spec = NAVIGATORS.spec(given.get("navigator", "scan"))
+    spec = NAVIGATORS.spec(given.get("navigator", attrs.fields(Experiment).navigator.default))
     scan = _values(given, width="scan_deg", about="scan_about_deg")
     if scan and spec.name != "scan":
         raise SettingError(
@@ -291,6 +276,11 @@ def _digest(experiment: Experiment, names: Collection[str]) -> str:
     if "model" in names and isinstance(experiment.model, Path):
         kept["model"] = _content(experiment.model)
     return hashlib.sha256(json.dumps([VERSION, kept], default=str).encode()).hexdigest()[:16]
+
+
+def _source(source: Any, kind: str) -> str:
+    """How settings name a world or a route."""
+    return str(source) if isinstance(source, str | Path) else f"a {kind} in memory"
 
 
 def _content(source: Any) -> str:

@@ -1,6 +1,7 @@
 """Where an experiment takes place: a world, a route through it, and the eye that sees it. Light to import."""
 
 import dataclasses
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,6 +21,20 @@ S = TypeVar("S", bound="Surroundings")
 BACKENDS = ("auto", "cpu", "egl", "osmesa")
 
 
+def _world(value: Any) -> Any:
+    """A world; a file as text, as the command line gives it."""
+    if not isinstance(value, Path):
+        return value
+    from tussock.world.params import is_generated
+
+    return os.path.join(os.curdir, value) if is_generated(str(value)) else str(value)  # a file named like a preset
+
+
+def _route(value: Any) -> Any:
+    """A route; a file as its path."""
+    return Path(value) if isinstance(value, str) else value
+
+
 @settings
 class Surroundings:
     """A world, a route through it, and the eye that sees it.
@@ -37,10 +52,10 @@ class Surroundings:
         threads: To draw with, and, in an experiment, to learn and compare with; None means one for each core.
     """
 
-    world: Any = attrs.field(default="tussock-field")
+    world: Any = attrs.field(default="tussock-field", converter=_world)
     world_seed: int | None = whole(None, low=0, optional=True)
     cull_back_faces: bool = switch(False)
-    route: Any = attrs.field(default=None)
+    route: Any = attrs.field(default=None, converter=_route)
     route_seed: int | None = whole(None, low=0, optional=True)
     route_length: float = number(8.0, low=0.1, unit="m")
     eye: Eye = instance_of(Eye, attrs.Factory(Eye), "an Eye")
@@ -49,11 +64,11 @@ class Surroundings:
     threads: int | None = whole(None, optional=True)
 
     def __attrs_post_init__(self):
-        if isinstance(self.world, str | Path):
+        if isinstance(self.world, str):
             from tussock.world.files import check_world
 
             check_world(self.world)
-        if isinstance(self.route, str | Path) and not Path(self.route).is_file():
+        if isinstance(self.route, Path) and not self.route.is_file():
             raise FileError(f"there is no route {self.route}; give a file, or none to have one generated")
 
     def replace(self: S, **changes: Any) -> S:

@@ -1,5 +1,6 @@
 """What all tests share. Shapes and types in signatures are checked while the tests run."""
 
+import os
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -11,11 +12,15 @@ from jaxtyping import install_import_hook
 
 install_import_hook(["tussock.world", "tussock.render", "tussock.navigation"], "typecheck.check")
 
+# Workers of pytest-xdist share the cores: more threads than one each would only wait for one another.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # No test asserts a time, those of hypothesis included.
 settings.register_profile("no deadline", settings(), deadline=None)
 settings.load_profile("no deadline")
 
-# A shell has what it runs in the background ignore Ctrl-C, and so all that the tests start; they are to heed it.
+# A shell lets what it runs in the background ignore Ctrl-C, and so everything that the tests start; here it must not be ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
@@ -25,8 +30,19 @@ SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 def sussex() -> Path:
     """The folder of the original world and routes."""
     if not SUSSEX.is_dir():
-        pytest.skip("the Sussex world is not on this machine (a folder shared/sussex beside the project)")
+        pytest.skip("the Sussex world is not on this machine (a folder shared/sussex next to the project)")
     return SUSSEX
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[str]:
+    """The address of a Dask scheduler with one worker, both in threads of this process."""
+    from distributed import LocalCluster
+
+    free = "127.0.0.1:0"  # of the pages that they serve
+    pages = {"dashboard_address": free, "worker_dashboard_address": free}
+    with LocalCluster(processes=False, n_workers=1, threads_per_worker=1, **pages) as local:
+        yield local.scheduler_address
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ from fuzzing import FOLDER, NUMBERS, answer, damaged, holds, main
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tussock.navigation.sweeps.spec import SETTINGS, read_sweep
+from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
+from tussock.navigation.sweeps.sweep_file import read_sweep
 
 GOOD = b"""title = "a sweep"
 [fixed]
@@ -17,7 +18,7 @@ size = "60x12"
 model = ["perfect-memory", "infomax units=20"]
 seed = { from = 0, to = 3 }
 offset-m = [-0.1, 0, 0.1]
-who = [{ encoding = "grey", every = 2 }, { encoding = "sky", every = 3 }]
+learner = [{ encoding = "grey", every = 2 }, { encoding = "sky", every = 3 }]
 """
 
 words = st.sampled_from(
@@ -32,7 +33,7 @@ scalars = (
     | st.dates()
     | st.text(max_size=5)
 )
-keys = st.sampled_from([*SETTINGS, "from", "to", "step", "count", "title", "offset-m"])
+keys = st.sampled_from([*TYPES, "from", "to", "step", "count", "title", "offset-m"])
 numbers = st.integers(-3, 3) | st.floats() | st.sampled_from([*NUMBERS, -(2**63), 10**400, 1e308, -1e308, 5e-324])
 ranges = st.fixed_dictionaries({"from": numbers, "to": numbers}, optional={"step": numbers, "count": numbers})
 values = ranges | st.recursive(
@@ -57,12 +58,14 @@ def toml(value) -> str:
 
 
 def runs_of(data: bytes) -> None:
-    """A sweep file is refused in one line that names it, or every one of its runs has settings."""
+    """A sweep file is refused in one line that names it, or each of its runs is an experiment that follows from its settings."""
     path = FOLDER / "sweep.toml"
     path.write_bytes(data)
     sweep = answer(path, lambda: read_sweep(path))
     if sweep is not None:
-        assert len(list(sweep.runs())) == len(sweep) > 0
+        assert len(sweep) > 0
+        for run in sweep.experiments[:50]:
+            assert experiment_of(settings_of(run)) == run
 
 
 @holds(150)

@@ -1,7 +1,7 @@
-"""What all fuzzing shares: damage to files of any kind, and running properties under a limit of memory.
+"""Shared by the fuzz_*.py files: damage to files of any kind, and running properties under a limit of memory.
 
-`python tests/fuzz_files.py world_files routes --examples 20000` hunts; test_fuzz.py runs all properties a little. They run in a
-process of their own, without the tests' checks of types: what breaks here breaks for people.
+`python tests/fuzz_files.py world_files routes --examples 20000` searches for defects; test_fuzz.py tries each property on a few examples.
+They run in a process of their own, without the type checks of the tests, so a failure here is one that users would meet.
 """
 
 import argparse
@@ -23,8 +23,8 @@ from tussock.world.errors import InputError
 T = TypeVar("T")
 PROPERTIES: dict[str, tuple[Callable, int]] = {}
 
-MEMORY = 3 * 2**30  # bytes that properties may take beyond what is there when they begin
-FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))  # what a process broke on is left in it
+MEMORY = 3 * 2**30  # bytes that properties may take beyond those at the start
+FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))  # holds the input of a failure afterwards
 
 NUMBERS = (0, 1, 2, 3, 255, 2**16, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 2**63, 2**64 - 1)
 TOKENS = (
@@ -40,7 +40,7 @@ VALUES = st.recursive(
 
 @st.composite
 def damaged(draw, whole: Sequence[bytes]) -> bytes:
-    """One of some files with bytes changed, put in, cut, repeated, numbers overwritten, or words and numbers of text exchanged."""
+    """One of some files with bytes changed, inserted, cut or repeated, numbers overwritten, or words and numbers of text exchanged."""
     data = bytearray(draw(st.sampled_from(whole)))
     for _ in range(draw(st.integers(1, 3))):
         near = draw(st.sampled_from([40, 400, len(data)]))
@@ -72,14 +72,14 @@ def damaged_json(draw, tree: Any) -> Any:
     """JSON with values exchanged, keys left out, or lists made longer, in a few places."""
     tree = json.loads(json.dumps(tree))
     for _ in range(draw(st.integers(1, 3))):
-        places = [
+        entries = [
             (holder, key)
             for holder in _holders(tree)
             for key in (holder if isinstance(holder, dict) else range(len(holder)))
         ]
-        if not places:
+        if not entries:
             break
-        holder, key = draw(st.sampled_from(places))
+        holder, key = draw(st.sampled_from(entries))
         how = draw(st.sampled_from(["value", "value", "drop", "more"]))
         if how == "value":
             holder[key] = draw(VALUES)
@@ -103,7 +103,7 @@ def _holders(tree: Any) -> list:
 
 
 def answer(names: str | Path | None, ask: Callable[[], T]) -> T | None:
-    """What `ask` gives, or None where it refuses with one line that names what is wrong; anything else is a defect."""
+    """The result of `ask`, or None where it refuses with one line that contains `names`; anything else is a defect."""
     try:
         return ask()
     except InputError as error:
@@ -114,7 +114,7 @@ def answer(names: str | Path | None, ask: Callable[[], T]) -> T | None:
 
 
 def holds(examples: int) -> Callable[[Callable], Callable]:
-    """Enter a property, under its name, with how many examples it is tried on by default."""
+    """Decorator: register a property under its name, with the number of examples that it is tried on by default."""
 
     def enter(run: Callable) -> Callable:
         PROPERTIES[run.__name__] = run, examples
@@ -124,21 +124,21 @@ def holds(examples: int) -> Callable[[Callable], Callable]:
 
 
 def _address_space() -> int:
-    """Bytes of address space that this process takes."""
+    """Size of the address space of this process (bytes)."""
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def main() -> None:
-    """Run the properties entered, by their names (none: all), as the command line says."""
+    """Run the properties that the command line names, or all."""
     parser = argparse.ArgumentParser()
     parser.add_argument("names", nargs="*", choices=[*PROPERTIES, []])
-    parser.add_argument("--examples", type=int, default=None, help="of each; by default few")
-    parser.add_argument("--random", action="store_true", help="others in each run")
+    parser.add_argument("--examples", type=int, default=None, help="of each property; default: few")
+    parser.add_argument("--random", action="store_true", help="other examples in each run")
     arguments = parser.parse_args()
     faulthandler.enable()
     limit = _address_space() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    broken = []
+    failed = []
     for name in arguments.names or PROPERTIES:
         run, few = PROPERTIES[name]
         chosen = settings(
@@ -149,6 +149,6 @@ def main() -> None:
             chosen(run)()
         except BaseException:
             sys.excepthook(*sys.exc_info())
-            broken.append(name)
-        print(f"{name}: {'broken' if name in broken else 'holds'}", flush=True)
-    sys.exit(bool(broken))
+            failed.append(name)
+        print(f"{name}: {'fails' if name in failed else 'holds'}", flush=True)
+    sys.exit(bool(failed))

@@ -1,4 +1,4 @@
-"""Nothing that people can give breaks anything: see fuzzing.py. Here every property is tried a little, the same in each run."""
+"""Any input is used or refused in one line: see fuzzing.py. Each property is tried on a few examples, the same in each run."""
 
 import os
 import subprocess
@@ -23,21 +23,21 @@ from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
 HERE = Path(__file__).parent
-GENEROUS = 600  # seconds; only what hangs takes so long
+LIMIT = 600  # seconds; only a process that hangs takes as long
 
 
 @pytest.mark.parametrize("file", ["fuzz_files", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"])
-def test_anything_is_used_or_refused(file):
+def test_any_input_is_used_or_refused(file):
     paths = os.pathsep.join([str(HERE.parent), str(HERE), os.environ.get("PYTHONPATH", "")])
     run = subprocess.run(
         [sys.executable, "-W", "error::RuntimeWarning", str(HERE / f"{file}.py")],
-        env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, errors="replace", timeout=GENEROUS,
+        env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, errors="replace", timeout=LIMIT,
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr[-5000:]
     assert "holds" in run.stdout
 
 
-# What was found, by name.
+# Defects that fuzzing found, each in a test of its own.
 
 
 def test_names_that_would_leave_a_copy_are_refused(tmp_path):
@@ -66,7 +66,7 @@ def test_an_image_that_unpacks_to_gigabytes_is_refused(tmp_path):
         read_image(tmp_path / "bomb.png")
 
 
-def test_a_mesh_that_stands_in_very_many_places_is_refused(tmp_path, monkeypatch):
+def test_a_mesh_that_is_repeated_too_often_is_refused(tmp_path, monkeypatch):
     import trimesh
 
     scene = trimesh.Scene()

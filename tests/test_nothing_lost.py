@@ -1,80 +1,86 @@
-"""Real processes, killed while they write, and a real disk that is full: what was done before stays, and the same command goes on.
+"""Processes that are killed while they write, and a full disk: what was done before stays, and the same command goes on.
 
-Sweeps have their own in test_sweeps.py.
+Those of sweeps are in test_sweeps.py.
 """
 
 import json
 import shlex
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
-from tussock.navigation.recording.log import viewer_program
+import pytest
+from commands import TUSSOCK, process, process_json
 
-TUSSOCK = str(Path(sys.executable).with_name("tussock"))
-WORLD = ["--world", "tiny", "--seed", "2", "--size", "120x25"]
+from tussock.navigation.recording.log import Recording
+from tussock.navigation.recording.viewer import viewer_program
+from tussock.render.eye import Eye
+from tussock.render.renderer import open_renderer
+from tussock.world.errors import DiskFullError
+from tussock.world.routes import generate_route
+from tussock.world.scene import World
+
+WORLD = ["--world", "tiny", "--seed", "2", "--size", "120x25", "--samples", "1"]
 
 
-def tussock(*words, **options) -> subprocess.CompletedProcess:
-    return subprocess.run([TUSSOCK, *map(str, words)], capture_output=True, text=True, **options)
-
-
-def grow(disk: Path) -> None:
-    """Make room."""
+def enlarge(disk: Path) -> None:
+    """Make room on it."""
     subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
 
 
-def test_a_killed_run_says_how_to_go_on_and_its_recording_opens(tmp_path):
+@pytest.mark.slow
+def test_a_killed_run_explains_how_to_go_on_and_its_recording_opens(tmp_path):
     out = tmp_path / "run"
     walk = [TUSSOCK, "run", *WORLD, "--step-m", "0.002", "--out", out]  # over a thousand steps
-    with subprocess.Popen(walk, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
+    with subprocess.Popen(walk, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
         recording = out / "recording.rrd"
         while not (recording.exists() and recording.stat().st_size > 400_000):
-            assert process.poll() is None
+            assert running.poll() is None
             time.sleep(0.02)
-        process.send_signal(signal.SIGKILL)
+        running.send_signal(signal.SIGKILL)
     stats = subprocess.run([viewer_program(), "rrd", "stats", recording], capture_output=True, text=True)
     assert stats.returncode == 0, stats.stderr
     assert "/deviation/m" in stats.stdout
     assert not (out / "summary.json").exists()
-    again = tussock("run", *WORLD, "--out", out)
+    again = process("run", *WORLD, "--out", out)
     assert again.returncode == 2
-    assert again.stderr.splitlines()[-1] == (
-        f"tussock: {out} already holds a run that is not finished; see {out / 'UNFINISHED.txt'}, or give another --out"
+    last = again.stderr.splitlines()[-1]
+    assert all(
+        word in last for word in (f"{out} already holds a run", "not finished", str(out / "UNFINISHED.txt"), "--out")
     )
     (command,) = [line.strip() for line in (out / "UNFINISHED.txt").read_text().splitlines() if line.startswith("    ")]
-    resumed = tussock(*shlex.split(command)[1:], "--json")
-    assert resumed.returncode == 0, resumed.stderr
-    assert json.loads((out / "summary.json").read_text())["steps"] == json.loads(resumed.stdout)["steps"]
+    resumed = process_json(*shlex.split(command)[1:])
+    assert json.loads((out / "summary.json").read_text())["steps"] == resumed["steps"]
     assert not (out / "UNFINISHED.txt").exists()
 
 
-def test_a_run_on_a_full_disk_says_so_and_leaves_no_summary(small_disk):
+@pytest.mark.slow
+def test_a_run_on_a_full_disk_is_reported_and_leaves_no_summary(small_disk):
     run = ["run", *WORLD, "--out", small_disk / "run"]
-    done = tussock(*run)
+    done = process(*run)
     assert done.returncode == 2
     assert "make room" in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
     assert not (small_disk / "run" / "summary.json").exists()
-    grow(small_disk)
-    assert tussock(*run, "--overwrite").returncode == 0
+    enlarge(small_disk)
+    assert process(*run, "--overwrite").returncode == 0
     assert (small_disk / "run" / "summary.json").exists()
 
 
+@pytest.mark.slow
 def test_a_database_on_a_full_disk_keeps_its_images_and_is_completed(small_disk, tmp_path):
     grid = ["database", "grid", *WORLD[:4], "--size", "360x75", "--spacing-m", "0.3", "--json"]
-    done = tussock(*grid, "--out", small_disk / "grid")
+    done = process(*grid, "--out", small_disk / "grid")
     assert done.returncode == 2
     assert "make room" in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
     before = {path: path.read_bytes() for path in (small_disk / "grid").glob("*.png")}
     assert before
-    grow(small_disk)
-    assert tussock(*grid, "--out", small_disk / "grid").returncode == 0
+    enlarge(small_disk)
+    assert process(*grid, "--out", small_disk / "grid").returncode == 0
     assert all(path.read_bytes() == image for path, image in before.items())
-    assert tussock(*grid, "--out", tmp_path / "grid").returncode == 0
+    assert process(*grid, "--out", tmp_path / "grid").returncode == 0
     names = {path.name for path in (tmp_path / "grid").iterdir()}
     assert {path.name for path in (small_disk / "grid").iterdir()} == names
     assert all(
@@ -82,3 +88,24 @@ def test_a_database_on_a_full_disk_keeps_its_images_and_is_completed(small_disk,
         for name in names
         if name.endswith("png")
     )
+
+
+class Silent:
+    """A stream of rerun whose writer has ended without an answer."""
+
+    def flush(self, *, timeout_sec: float = float("inf")) -> None:
+        assert timeout_sec < 1000, "it would wait for ever"
+        raise RuntimeError("timed out")
+
+    def disconnect(self) -> None:
+        pass
+
+
+def test_a_recording_does_not_wait_for_ever_for_its_disk(tmp_path):
+    world = World.generate("tiny", 2)
+    with open_renderer(world, Eye(width=60, height=12), "cpu") as renderer:
+        recording = Recording(tmp_path / "r.rrd", renderer, generate_route(world, 2))
+        (stream,), recording._streams = recording._streams, [Silent()]
+        stream.disconnect()
+        with pytest.raises(DiskFullError, match=r"r\.rrd .+ make room"):
+            recording.close()

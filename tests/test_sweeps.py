@@ -1,4 +1,4 @@
-"""Sweeps with real processes: what a file asks for, the same table from any cluster, and nothing lost whatever is killed."""
+"""Sweeps: what a file asks for, the same table from any cluster, and nothing lost whatever is killed."""
 
 import json
 import os
@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -19,20 +20,24 @@ import pandas as pd
 import psutil
 import pytest
 from browser import WIDTHS, in_browser
+from commands import TUSSOCK, printed, process_json, tussock
 
-from tussock.navigation.cli.run_options import RunOptions
+from tussock.navigation.experiment import Experiment
+from tussock.navigation.experiment_settings import TYPES, experiment_of, key_of, settings_of
+from tussock.navigation.models import PerfectMemory
+from tussock.navigation.models import files as model_files
+from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.reports.report import Drawing
-from tussock.navigation.sweeps.spec import read_sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
 from tussock.navigation.sweeps.sweep import finished_run, record_again
-from tussock.navigation.sweeps.work import Walked, lesson_key, options_of, path_key, run_key
+from tussock.navigation.sweeps.sweep_file import read_sweep
+from tussock.navigation.sweeps.work import Walked
 from tussock.navigation.sweeps.worst import walk_section
+from tussock.render.eye import Eye
 from tussock.world.errors import InputError
 
-BIN = Path(sys.executable).parent
-TUSSOCK = str(BIN / "tussock")
-HEAD = '[fixed]\nworld = "tiny"\nsize = "60x12"\n'
-SWEEP = HEAD + '[axes]\nmodel = ["perfect-memory", "rbm"]\nseed = { from = 0, to = 3 }\noffset-m = [-0.1, 0, 0.1]\n'
+HEAD = '[fixed]\nworld = "tiny"\nsize = "60x12"\nspacing-m = 0.1\n'
+SWEEP = HEAD + '[axes]\nmodel = ["perfect-memory", "infomax"]\nseed = { from = 0, to = 3 }\noffset-m = [-0.1, 0, 0.1]\n'
 MANY = HEAD + "[axes]\nseed = { from = 0, to = 29 }\n"
 
 
@@ -42,32 +47,348 @@ def written(folder: Path, text: str, name: str = "sweep.toml") -> Path:
     return path
 
 
-def sweep(path: Path, out: Path, *words) -> dict:
-    """What `tussock sweep` prints; it succeeds."""
-    done = subprocess.run([TUSSOCK, "sweep", path, "--out", out, "--json", *words], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
 def table(out: Path) -> pd.DataFrame:
     """The table of a sweep, times aside."""
     return pd.read_parquet(out / "runs.parquet").drop(columns=list(TIMES))
 
 
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory) -> Path:
+    """The folder of a whole sweep, with workers that it started itself."""
+    folder = tmp_path_factory.mktemp("swept")
+    result = process_json("sweep", written(folder, SWEEP), "--out", folder / "out", "--record", "worst:1")
+    assert (result["runs"], result["done_before"], result["could_not_run"]) == (24, 0, 0)
+    return folder / "out"
+
+
+# Runs and their table
+
+
+def test_the_table_has_one_row_per_run_in_the_order_of_the_settings(swept):
+    rows = table(swept)
+    assert len(rows) == len(set(rows["key"])) == 24
+    assert rows["seed"].tolist() == sorted(rows["seed"])
+    assert set(rows["model"]) == {"perfect-memory", "infomax"}
+    assert rows["error"].isna().all()
+    assert rows["arrived"].mean() > 0.5
+    assert (rows["reason"] == "arrived").tolist() == rows["arrived"].tolist()
+
+
+def test_the_command_of_a_row_repeats_its_run_alone(capfd, swept, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for row in table(swept).iloc[[0, -1]].to_dict("records"):
+        _, *arguments = shlex.split(row["command"])
+        alone = printed(capfd, *arguments)
+        names = ("arrived", "steps", "mean_deviation_m", "mean_error_deg", "poor_steps")
+        assert all(alone[name] == row[name] for name in names)
+        with Store(swept, read_only=True) as store:
+            assert Path(arguments[-1], "trajectory.csv").read_text() == store.steps(row["key"])
+
+
+def test_the_worst_runs_are_recorded(swept):
+    rows = table(swept)
+    (recorded,) = rows[rows["recording"].notna()].to_dict("records")
+    assert (swept / recorded["recording"]).is_file()
+    worst = rows.sort_values(["arrived", "mean_deviation_m"], ascending=[True, False]).iloc[0]
+    assert recorded["key"] == worst["key"]
+
+
+def test_a_second_time_nothing_is_done_and_new_choices_of_an_axis_are_added(capfd, swept, cluster, tmp_path):
+    out = shutil.copytree(swept, tmp_path / "out")
+    before = (out / "runs.parquet").read_bytes()
+    again = ["--out", out, "--scheduler", cluster]
+    assert printed(capfd, "sweep", written(tmp_path, SWEEP), *again)["done_before"] == 24
+    assert (out / "runs.parquet").read_bytes() == before
+    other = written(tmp_path, SWEEP.replace("[-0.1, 0, 0.1]", "[-0.1, 0, 0.15]"))
+    result = printed(capfd, "sweep", other, *again)
+    assert (result["runs"], result["done_before"]) == (24, 16)
+    assert len(table(out)) == 32
+
+
+def test_another_cluster_gives_the_same_table(capfd, swept, cluster, tmp_path):
+    """The last digits too: the runs that tell the models, the seeds and the starts apart."""
+    part = SWEEP.replace("to = 3", "to = 1").replace("[-0.1, 0, 0.1]", "[0, 0.1]")
+    printed(capfd, "sweep", written(tmp_path, part), "--out", tmp_path / "out", "--scheduler", cluster)
+    here = table(tmp_path / "out").drop(columns="recording")
+    there = table(swept).drop(columns="recording")
+    there = there[there["key"].isin(here["key"])].reset_index(drop=True)
+    assert len(here) == 8
+    pd.testing.assert_frame_equal(here, there, check_exact=True)
+
+
+def test_a_run_that_cannot_be_done_is_a_row_with_the_reason(capfd, cluster, tmp_path):
+    path = written(tmp_path, HEAD + "[axes]\noffset-m = [0, 40.0]\n")
+    result = printed(capfd, "sweep", path, "--out", tmp_path / "out", "--scheduler", cluster)
+    assert result["could_not_run"] == 1
+    rows = table(tmp_path / "out").set_index("offset_m")
+    assert "outside the world" in rows.loc[40.0, "error"]
+    assert rows.loc[0.0, "arrived"]
+
+
+def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
+    rows = {
+        str(k): {"seed": k % 5, "model": "ab"[k % 2], "route": None if k % 3 else "r", "error": None} for k in range(20)
+    }
+    shuffled = dict(np.random.default_rng(0).permutation(list(rows.items())).tolist())
+    assert table_of(shuffled).equals(table_of(rows))
+
+
+# Sweep files
+
+REFUSED: list[tuple[str, int | None, list[str]]] = [  # the text, the line that the message names, what else it holds
+    ("", None, ["[axes]"]),
+    ("[axes]\n", None, ["[axes]"]),
+    ("[axes\n", None, ["TOML", "']'", "line 1"]),
+    ("[axes]\nseed = [1]\n[axis]\n", 3, ["'axis'", "[fixed]", "[axes]"]),
+    ("title = 3\n[axes]\nseed = [1]\n", 1, ["title", "text"]),
+    ("[fixed]\nmodle = 'rbm'\n[axes]\nseed = [1]\n", 2, ["'modle'", "did you mean model?"]),
+    ("[axes]\nseed = [1]\nstep-m = []\n", 3, ["step-m", "at least one value", "range"]),
+    ("[axes]\nseed = [1, 2.5]\n", 2, ["seed", "2.5", "whole number"]),
+    ("[axes]\nseed = [\n  1,\n  'two',\n]\n", 2, ["seed", "'two'", "whole number"]),
+    ('[axes]\nmodel = [\n  "rbm",\n  "rbn",\n]\n', 4, ["'rbn'", "perfect-memory"]),
+    ("[axes]\nseed = [1, 1]\n", 2, ["seed", "twice"]),
+    ("[axes]\nseed = { from = 3, to = 1 }\n", 2, ["range", "3"]),
+    ("[axes]\nseed = { from = 0, to = 1e9, step = 1e-9 }\n", 2, ["range", "1e-09"]),
+    ("[axes]\nseed = { to = 1 }\n", 2, ["range", "from = 0, to = 19"]),
+    ("[fixed]\nseed = 3\n[axes]\nseed = [1]\n", 4, ["seed", "fixed", "leave one out"]),
+    ("[fixed]\nscan-deg = 400\n[axes]\nseed = [1]\n", 2, ["width", "400 degrees"]),
+    ("[fixed]\non-lost = 'cry'\n[axes]\nseed = [1]\n", 2, ["'cry'", "stop or reset"]),
+    ("[fixed]\nworld = 'there-is-none.glb'\n[axes]\nseed = [1]\n", 2, ["there-is-none.glb"]),
+    ("[axes]\nworld = ['tiny', 'tiny field_width=900']\n", 2, ["'tiny field_width=900'", "field_width", "900"]),
+    ("[axes]\nseed = {from=0, to=9999}\noffset-m = {from=0, to=1, count=9999}\n", None, ["99,990,000 runs", "1,000,000"]),
+    ("[axes]\nseed = {from=0, to=1e308}\n", 2, ["range"]),
+    ("[axes]\noffset-m = {from=-1e308, to=1e308, count=3}\n", 2, ["range"]),
+    ("[axes]\noffset-m = {from=0, to=1, step=5e-324}\n", 2, ["range"]),
+    (f"[axes]\nseed = {{from=0, to=1{'0' * 400}}}\n", 2, ["range"]),
+    (f"[axes]\noffset-m = [1{'0' * 400}]\n", 2, ["offset-m", "1000"]),
+    ("[axes]\n" + "".join(f"{name} = {{from=1, to=999}}\n" for name in ("seed", "route-seed", "every")), None, ["997,002,999 runs"]),
+    ("[axes]\noffset-m = [0]\noffset_m = [0.1, 0.2]\n", 2, ["offset_m", "twice"]),
+    ("[axes]\nrenderer = ['cpu', 'gpu']\n", 2, ["'gpu'", "osmesa"]),
+    ("[axes]\nroute-length-m = [1, 0.05]\n", 2, ["route_length", "0.05"]),
+    ("[fixed]\nroute = '.'\n[axes]\nseed = [1]\n", 2, ["route"]),
+    ("[axes]\nwho = [{model = 'rbm'}, {encoding = 'grey'}]\n", 2, ["who", "the same", "model"]),
+    ("[fixed]\nsize = '720x150'\n[axes]\nsamples = [1, 64]\n", 4, ["720 x 150", "64"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "line", "words"), REFUSED)
+def test_a_file_that_cannot_be_run_is_refused_with_its_line(text, line, words, tmp_path):
+    path = written(tmp_path, text)
+    with pytest.raises(InputError) as refused:
+        read_sweep(path)
+    message = str(refused.value)
+    assert message.startswith(str(path) if line is None else f"{path}, line {line}: ")
+    assert all(word in message for word in words), message
+    assert "\n" not in message
+
+
+def test_a_sweep_is_all_combinations_of_its_choices(tmp_path):
+    path = written(
+        tmp_path,
+        HEAD + "[axes]\nlearner = [{model = 'rbm', encoding = 'grey'}, {model = 'chain', encoding = 'sky'}]\n"
+        "offset_m = {from = -0.2, to = 0.2, count = 3}\nseed = {from = 3, to = 7, step = 2}\nscan-deg = [90]\n",
+    )
+    sweep = read_sweep(path)
+    runs = [settings_of(run) for run in sweep.experiments]
+    assert [(run["model"], run["encoding"], run["offset_m"], run["seed"]) for run in runs[:4]] == [
+        ("rbm", "grey", -0.2, 3), ("rbm", "grey", -0.2, 5), ("rbm", "grey", -0.2, 7), ("rbm", "grey", 0.0, 3),
+    ]  # fmt: skip
+    assert (len(sweep), runs[-1]["model"], runs[-1]["seed"]) == (18, "chain", 7)
+    assert {(run["world"], run["size"], run["scan_deg"], run["threads"]) for run in runs} == {
+        ("tiny", "60x12", 90.0, 1)
+    }
+    assert str(sweep) == "2 of learner, 3 of offset_m, 3 of seed, 1 of scan_deg"
+
+
+@pytest.mark.parametrize(
+    ("fixed", "eye"),
+    [
+        ('size = "60x12"\nsamples = 64', Eye(width=60, height=12, samples=64)),
+        ("top-deg = -20\nbottom-deg = -60", Eye(top=np.radians(-20), bottom=np.radians(-60))),
+    ],
+)
+def test_settings_of_a_file_are_checked_together(tmp_path, fixed, eye):
+    """With the defaults of the others, each of them would be refused."""
+    sweep = read_sweep(written(tmp_path, f"[fixed]\n{fixed}\n[axes]\nseed = [1, 2]\n"))
+    assert [run.eye for run in sweep.experiments] == [eye, eye]
+
+
+def test_files_that_a_sweep_names_are_found_from_everywhere(tmp_path, monkeypatch):
+    (tmp_path / "route.csv").write_text("x_m,y_m\n0,0\n1,1\n")
+    written(tmp_path, "[fixed]\nroute = 'route.csv'\n[axes]\nseed = [1]\n")
+    monkeypatch.chdir(tmp_path)
+    (run,) = read_sweep(Path("sweep.toml")).experiments
+    assert run.route == tmp_path / "route.csv"
+
+
+def test_a_file_that_is_named_like_a_choice_changes_no_run(tmp_path, monkeypatch):
+    path = written(tmp_path, HEAD + "[axes]\nmodel = ['infomax', 'random']\nencoding = ['grey', 'edges']\n")
+    before = [key_of(run) for run in read_sweep(path).experiments]
+    for name in ("infomax", "random", "grey", "tiny", "60x12"):
+        (tmp_path / name).write_text("something else")
+    monkeypatch.chdir(tmp_path)
+    assert [key_of(run) for run in read_sweep(path).experiments] == before
+
+
+def test_the_file_of_a_model_is_read_once_for_all_runs(tmp_path, monkeypatch):
+    eye = Eye(width=60, height=12)
+    model = PerfectMemory().fit(experiment_of({}).encoding(np.zeros((1, 12, 60, 4), np.uint8)))
+    save_model(TrainedModel(model=model, encoding=None, eye=eye, poses=None), tmp_path / "m.safetensors")
+    loaded, load = [], model_files.load_model
+    monkeypatch.setattr(model_files, "load_model", lambda path, **more: loaded.append(path) or load(path, **more))
+    text = "[fixed]\nmodel = 'm.safetensors'\nresize = 6\n[axes]\nseed = {from = 0, to = 49}\noffset-m = [0, 0.1]\n"
+    sweep = read_sweep(written(tmp_path, text))
+    assert len({key_of(run) for run in sweep.experiments}) == 100
+    assert {run.eye for run in sweep.experiments} == {eye}
+    assert loaded == [tmp_path / "m.safetensors"]
+
+
+# The folder of a sweep
+
+
+def kept(key: str, settings: dict, *, again: bool = False, **row) -> Finished:
+    return Finished(key=key, settings=settings, row=settings | row, steps="x_m\n0\n", again=again)
+
+
+def test_equal_settings_have_one_row_the_newest(tmp_path):
+    with Store(tmp_path) as store:
+        store.add([kept("a", {"route": "r.csv"}, steps=1), kept("b", {"route": "s.csv"}, steps=2)])
+        store.add([kept("c", {"route": "r.csv"}, steps=3)])  # the file holds another route now
+        assert {key: row["steps"] for key, row in store.rows().items()} == {"b": 2, "c": 3}
+
+
+def test_a_run_that_failed_is_a_row_and_is_tried_again(tmp_path):
+    run = Experiment(world="tiny")
+    first = finished_run(run, "a", InputError("no EGL on this machine"))
+    with Store(tmp_path) as store:
+        store.add([first])
+        assert store.finished() == set()
+        assert store.rows()["a"]["error"] == "no EGL on this machine"
+        store.add([finished_run(run, "a", Walked(results={"arrived": True}, steps="", seconds=1, learn_seconds=1))])
+        assert store.finished() == {"a"}
+        assert store.rows()["a"]["error"] is None
+        outside = Walked(refused="the start is outside", results={}, steps="", seconds=0, learn_seconds=1)
+        store.add([finished_run(run, "b", outside)])
+        assert store.finished() == {"b"}  # of the same settings; and it stays outside
+
+
+@pytest.mark.parametrize("damage", ["middle", "columns", "killed"])
+def test_a_damaged_folder_is_refused_in_one_line(tmp_path, damage, swept):
+    out = shutil.copytree(swept, tmp_path / "out")
+    path = out / "finished.sqlite"
+    if damage == "middle":
+        whole = bytearray(path.read_bytes())
+        whole[4096:-4096] = b"\xa5" * (len(whole) - 8192)
+        path.write_bytes(whole)
+    elif damage == "columns":
+        path.unlink()
+        with closing(sqlite3.connect(path)) as database:
+            database.execute("CREATE TABLE runs (key TEXT)")
+    else:  # in the middle of a transaction
+        script = (
+            "import os, sqlite3, sys; d = sqlite3.connect(sys.argv[1]); d.execute('PRAGMA cache_size=1')\n"
+            "d.execute('UPDATE runs SET row = hex(zeroblob(100000))'); os._exit(0)"
+        )
+        subprocess.run([sys.executable, "-c", script, path], check=True)
+        assert (out / "finished.sqlite-journal").stat().st_size > 0
+    if damage == "killed":  # what was finished before is all there
+        with Store(out, read_only=True) as store:
+            assert len(store.rows()) == 24
+        return
+    with (
+        pytest.raises(InputError, match=r"finished\.sqlite cannot be used") as refused,
+        Store(out, read_only=True) as store,
+    ):
+        store.rows()
+    assert "\n" not in str(refused.value)
+
+
+def test_a_folder_that_another_sweep_writes_to_is_refused(capfd, tmp_path):
+    path, out = written(tmp_path, MANY), tmp_path / "out"
+    with Store(out):
+        code, _, err = tussock(capfd, "sweep", path, "--out", out)
+    assert code == 2
+    assert f"another sweep is writing to {out}" in err.splitlines()[-1]
+    assert "--out" in err.splitlines()[-1]
+
+
+def test_a_recording_of_another_walk_is_removed(swept, tmp_path):
+    with Store(swept, read_only=True) as store:
+        row = next(iter(store.rows().values()))
+    run = experiment_of({name: row[name] for name in TYPES})
+    record_again(run, row, tmp_path / "here")
+    assert (tmp_path / "here" / "recording.rrd").exists()
+    for _ in range(2):  # the second time, too
+        with pytest.raises(InputError, match=r"another result \(steps\)"):
+            record_again(run, row | {"steps": row["steps"] + 1}, tmp_path / "here")
+        assert not (tmp_path / "here").exists()
+
+
+@pytest.fixture
+def old_folder(tmp_path) -> Path:
+    """The folder of a sweep as version 0.1 left it: it knew no navigators, and its rows had no encoding by default."""
+    out, left_out = tmp_path / "old", "navigator"
+    out.mkdir()
+    with closing(sqlite3.connect(out / "finished.sqlite")) as database:
+        database.execute(
+            "CREATE TABLE runs (key TEXT PRIMARY KEY, settings TEXT NOT NULL UNIQUE, row TEXT NOT NULL, steps BLOB NOT NULL, "
+            "again INTEGER NOT NULL)"
+        )
+        for seed in range(3):
+            run = experiment_of({"world": "tiny", "size": "60x12", "threads": 1, "seed": seed})
+            settings = {name: value for name, value in settings_of(run).items() if name != left_out} | {
+                "encoding": None
+            }
+            row = settings | {
+                "arrived": seed > 0, "reason": "arrived" if seed else "lost", "steps": 2, "mean_deviation_m": 0.1, "max_deviation_m": 0.2,
+                "mean_error_deg": 5.0, "resets": 0, "cause": None if seed else "corner", "poor_steps": 1, "n_views": 9, "route_m": 3.0,
+                "memory_bytes": 100, "occlusion_steps": 0, "off_the_catchment_steps": 0, "aliasing_steps": 0, "corner_steps": 1,
+                "unlearned_direction_steps": 0, "unexplained_steps": 0, "error": None, "command": f"tussock run --seed {seed}",
+                "seconds": 1.0, "learn_seconds": 1.0,
+            }  # fmt: skip
+            steps = (
+                "step,x_m,y_m,heading_deg,turn_deg,familiarity,deviation_m,along_m,error_deg,match,place,reset,reason,covered,"
+                "nearest_view_m,recognised_view_m,turning_deg,cause\n"
+                "0,1.5,1.5,90.0,60.0,0.9,0.1,0.0,60.0,3,,,,0.0,0.1,0.1,70.0,corner\n"
+                "1,1.5,1.55,150.0,0.0,0.9,0.2,0.05,5.0,3,,,lost,,,,,\n"
+            )
+            values = (f"key{seed}", json.dumps(settings), json.dumps(row), zlib.compress(steps.encode()), 0)
+            database.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?)", values)
+        database.commit()
+    return out
+
+
+def test_a_folder_of_an_older_version_is_refused_for_more_runs(capfd, old_folder, tmp_path):
+    before = (old_folder / "finished.sqlite").read_bytes()
+    code, _, err = tussock(capfd, "sweep", written(tmp_path, MANY), "--out", old_folder)
+    assert code == 2
+    last = err.splitlines()[-1]
+    assert all(word in last for word in (str(old_folder), "another version", "--out", "tussock report"))
+    assert (old_folder / "finished.sqlite").read_bytes() == before
+    assert not (old_folder / "runs.parquet").exists()
+
+
+def test_a_folder_of_an_older_version_is_still_reported(capfd, old_folder):
+    result = printed(capfd, "report", old_folder, "--worst", 1)
+    assert (result["runs"], result["could_not_run"]) == (3, 0)
+    assert result["arrived"] == pytest.approx(2 / 3)
+    assert "corner" in Path(result["report"]).read_text()
+
+
+# Processes that are killed, and disks that are full
+
+
 def finished(out: Path) -> int:
     """How many runs a folder holds so far."""
     try:
-        return (
-            sqlite3.connect(f"{(out / 'finished.sqlite').as_uri()}?mode=ro", uri=True)
-            .execute("SELECT count(*) FROM runs")
-            .fetchone()[0]
-        )
+        with closing(sqlite3.connect(f"{(out / 'finished.sqlite').as_uri()}?mode=ro", uri=True)) as database:
+            return database.execute("SELECT count(*) FROM runs").fetchone()[0]
     except sqlite3.OperationalError:
         return 0
 
 
 @contextmanager
-def going_on(path: Path, out: Path, *words, runs: int = 3) -> Iterator[subprocess.Popen]:
+def running(path: Path, out: Path, *words, runs: int = 3) -> Iterator[subprocess.Popen]:
     """A sweep that has finished some of its runs, but not all."""
     command = [TUSSOCK, "sweep", str(path), "--out", str(out), "--json", *words]
     with subprocess.Popen(
@@ -83,79 +404,16 @@ def going_on(path: Path, out: Path, *words, runs: int = 3) -> Iterator[subproces
                 process.kill()
 
 
-@pytest.fixture(scope="module")
-def swept(tmp_path_factory) -> Path:
-    """The folder of a whole sweep on a local cluster."""
-    folder = tmp_path_factory.mktemp("swept")
-    said = sweep(written(folder, SWEEP), folder / "out", "--record", "worst:1")
-    assert (said["runs"], said["done_before"], said["could_not_run"]) == (24, 0, 0)
-    return folder / "out"
-
-
-def test_a_row_a_run_in_the_order_of_the_settings(swept):
-    rows = table(swept)
-    assert len(rows) == len(set(rows["key"])) == 24
-    assert rows["seed"].tolist() == sorted(rows["seed"])
-    assert set(rows["model"]) == {"perfect-memory", "rbm"}
-    assert rows["error"].isna().all()
-    assert rows["arrived"].mean() > 0.5
-    assert (rows["reason"] == "arrived").tolist() == rows["arrived"].tolist()
-
-
-def test_the_command_of_a_row_repeats_its_run_alone(swept, tmp_path):
-    for row in table(swept).iloc[[0, -1]].to_dict("records"):
-        words = shlex.split(row["command"])
-        done = subprocess.run([TUSSOCK, *words[1:], "--json"], cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        alone = json.loads(done.stdout)
-        assert all(
-            alone[name] == row[name]
-            for name in ("arrived", "steps", "mean_deviation_m", "mean_error_deg", "poor_steps")
-        )
-        with Store(swept, read_only=True) as store:
-            assert (tmp_path / words[-1] / "trajectory.csv").read_text() == store.steps(row["key"])
-
-
-def test_the_worst_are_recorded(swept):
-    rows = table(swept)
-    (recorded,) = rows[rows["recording"].notna()].to_dict("records")
-    assert (swept / recorded["recording"]).is_file()
-    worst = rows.sort_values(["arrived", "mean_deviation_m"], ascending=[True, False]).iloc[0]
-    assert recorded["key"] == worst["key"]
-
-
-def test_done_again_nothing_is_done_and_more_of_an_axis_adds(swept, tmp_path):
-    out = tmp_path / "out"
-    shutil.copytree(swept, out)
-    before = (out / "runs.parquet").read_bytes()
-    assert sweep(written(tmp_path, SWEEP), out)["done_before"] == 24
-    assert (out / "runs.parquet").read_bytes() == before
-    said = sweep(written(tmp_path, SWEEP.replace("[-0.1, 0, 0.1]", "[-0.1, 0, 0.15]")), out)
-    assert (said["runs"], said["done_before"]) == (24, 16)
-    assert len(table(out)) == 32
-
-
-def test_a_scheduler_with_workers_started_by_hand_gives_the_same_table(swept, tmp_path):
-    with scheduler(workers=2) as (address, _):
-        sweep(written(tmp_path, SWEEP), tmp_path / "out", "--scheduler", address)
-    by_hand, here = table(tmp_path / "out").drop(columns="recording"), table(swept).drop(columns="recording")
-    by_hand.to_parquet(tmp_path / "a.parquet")
-    here.to_parquet(tmp_path / "b.parquet")
-    assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
-
-
 @contextmanager
 def scheduler(workers: int) -> Iterator[tuple[str, subprocess.Popen]]:
     """A Dask scheduler and workers, started as people start them."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    dask, quiet = Path(TUSSOCK).with_name("dask"), {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     local = ["--no-dashboard", "--host", "127.0.0.1"]
-    started = [subprocess.Popen([BIN / "dask", "scheduler", *local, "--port", address.rpartition(":")[2]], **quiet)]
-    started += [
-        subprocess.Popen([BIN / "dask", "worker", address, "--nthreads", "1", *local], **quiet) for _ in range(workers)
-    ]
+    started = [subprocess.Popen([dask, "scheduler", *local, "--port", address.rpartition(":")[2]], **quiet)]
+    started += [subprocess.Popen([dask, "worker", address, "--nthreads", "1", *local], **quiet) for _ in range(workers)]
     try:
         while True:
             try:
@@ -173,8 +431,9 @@ def scheduler(workers: int) -> Iterator[tuple[str, subprocess.Popen]]:
             each.wait()
 
 
-def test_a_killed_worker_loses_nothing_and_all_listen_here_only(tmp_path):
-    with going_on(written(tmp_path, MANY), tmp_path / "out") as process:
+@pytest.mark.slow
+def test_a_killed_worker_loses_nothing_and_all_listen_on_this_machine_only(tmp_path):
+    with running(written(tmp_path, MANY), tmp_path / "out") as process:
         below = psutil.Process(process.pid).children(recursive=True)
         workers = [each for each in below if any("spawn_main" in word for word in each.cmdline())]
         listening = [
@@ -184,31 +443,33 @@ def test_a_killed_worker_loses_nothing_and_all_listen_here_only(tmp_path):
             if c.status == "LISTEN"
         ]
         workers[0].kill()
-        said, err = process.communicate()
+        out, err = process.communicate()
     assert process.returncode == 0, err
     assert set(listening) == {"127.0.0.1"}
-    assert json.loads(said)["runs"] == 30
+    assert json.loads(out)["runs"] == 30
     assert sorted(table(tmp_path / "out")["seed"]) == list(range(30))
     assert "Traceback" not in err
 
 
-def test_a_killed_scheduler_is_said_and_the_same_command_goes_on(tmp_path):
+@pytest.mark.slow
+def test_a_killed_scheduler_is_reported_and_the_same_command_goes_on(capfd, tmp_path):
     path, out = written(tmp_path, MANY), tmp_path / "out"
-    with scheduler(workers=1) as (address, process), going_on(path, out, "--scheduler", address) as going:
+    with scheduler(workers=1) as (address, process), running(path, out, "--scheduler", address) as sweep:
         process.kill()
-        _, err = going.communicate()
-    assert going.returncode == 2
-    assert err.splitlines()[-1].startswith("tussock: the scheduler is gone; all runs that were finished are kept")
+        _, err = sweep.communicate()
+    assert sweep.returncode == 2
+    assert all(word in err.splitlines()[-1] for word in ("scheduler is gone", "are kept", "the same command"))
     assert "Traceback" not in err
     before = finished(out)
-    assert sweep(path, out)["done_before"] == before >= 3
+    assert process_json("sweep", path, "--out", out)["done_before"] == before >= 3
     assert sorted(table(out)["seed"]) == list(range(30))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("how", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
 def test_an_interrupted_sweep_keeps_what_is_done_and_ends_its_workers(tmp_path, how, code):
     path, out = written(tmp_path, MANY), tmp_path / "out"
-    with going_on(path, out) as process:
+    with running(path, out) as process:
         below = psutil.Process(process.pid).children(recursive=True)
         os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)  # Ctrl-C reaches all of them
         _, err = process.communicate()
@@ -217,22 +478,12 @@ def test_an_interrupted_sweep_keeps_what_is_done_and_ends_its_workers(tmp_path, 
     _, alive = psutil.wait_procs(below, timeout=30)
     assert not alive
     before = finished(out)
-    with Store(out) as store:  # nobody holds the folder any more
+    with Store(out) as store:  # the folder is free again
         assert len(store.finished()) == before >= 3
 
 
-def test_two_sweeps_into_one_folder_at_once_are_refused(tmp_path):
-    path, out = written(tmp_path, MANY), tmp_path / "out"
-    with going_on(path, out):
-        done = subprocess.run([TUSSOCK, "sweep", path, "--out", out], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert (
-        done.stderr.splitlines()[-1]
-        == f"tussock: another sweep is writing to {out}; wait for it, or give another --out"
-    )
-
-
-def test_a_full_disk_is_said_and_with_room_the_sweep_goes_on(small_disk, tmp_path):
+@pytest.mark.slow
+def test_a_full_disk_is_reported_and_with_room_the_sweep_goes_on(small_disk, tmp_path):
     path, out = written(tmp_path, MANY), small_disk / "out"
     done = subprocess.run([TUSSOCK, "sweep", path, "--out", out], capture_output=True, text=True)
     assert done.returncode == 2
@@ -240,176 +491,31 @@ def test_a_full_disk_is_said_and_with_room_the_sweep_goes_on(small_disk, tmp_pat
     assert "no space" in done.stderr.lower()
     before = finished(out)
     subprocess.run(["mount", "-o", "remount,size=20m", small_disk], check=True)
-    assert sweep(path, out)["done_before"] == before > 0
+    assert process_json("sweep", path, "--out", out)["done_before"] == before > 0
     assert sorted(table(out)["seed"]) == list(range(30))
 
 
-def test_a_run_that_cannot_be_done_is_a_row_that_says_why(tmp_path):
-    path = written(tmp_path, HEAD + "[axes]\noffset-m = [0, 40.0]\n")
-    assert sweep(path, tmp_path / "out")["could_not_run"] == 1
-    rows = table(tmp_path / "out").set_index("offset_m")
-    assert "outside the world" in rows.loc[40.0, "error"]
-    assert rows.loc[0.0, "arrived"]
+@pytest.mark.slow
+def test_a_scheduler_with_workers_started_by_hand_gives_the_same_table(swept, tmp_path):
+    with scheduler(workers=2) as (address, _):
+        process_json("sweep", written(tmp_path, SWEEP), "--out", tmp_path / "out", "--scheduler", address)
+    by_hand, here = table(tmp_path / "out").drop(columns="recording"), table(swept).drop(columns="recording")
+    pd.testing.assert_frame_equal(by_hand, here, check_exact=True)
 
 
-REFUSED = [
-    ("", "has no [axes]"),
-    ("[axes]\n", "has no [axes]"),
-    ("[axes\n", "is not TOML: Expected ']' at the end of a table declaration (at line 1, column 6)"),
-    ("[axes]\nseed = [1]\n[axis]\n", "line 3: unknown 'axis'; a sweep has title, [fixed] and [axes]"),
-    ("title = 3\n[axes]\nseed = [1]\n", "line 1: title is a text"),
-    ("[fixed]\nmodle = 'rbm'\n[axes]\nseed = [1]\n", "line 2: 'modle' is no setting of a run; did you mean model?"),
-    ("[axes]\nseed = [1]\nstep-m = []\n", "line 3: step-m is a list with something in it, or a range"),
-    ("[axes]\nseed = [1, 2.5]\n", "line 2: seed is 2.5; give a whole number"),
-    ("[axes]\nseed = [\n  1,\n  'two',\n]\n", "line 2: seed is 'two'; give a whole number"),
-    ('[axes]\nmodel = [\n  "rbm",\n  "rbn",\n]\n', "line 4: unknown model 'rbn'; known:"),
-    ("[axes]\nseed = [1, 1]\n", "line 2: seed has the same choice twice"),
-    ("[axes]\nseed = { from = 3, to = 1 }\n", "line 2: the range"),
-    ("[axes]\nseed = { from = 0, to = 1e9, step = 1e-9 }\n", "line 2: the range"),
-    ("[axes]\nseed = { to = 1 }\n", "line 2: a range is { from = 0, to = 19 }"),
-    ("[fixed]\nseed = 3\n[axes]\nseed = [1]\n", "line 4: seed is set here and in fixed seed; leave one out"),
-    ("[fixed]\nscan-deg = 400\n[axes]\nseed = [1]\n", "line 2: a scan of 400 degrees"),
-    ("[fixed]\non-lost = 'cry'\n[axes]\nseed = [1]\n", "line 2: --on-lost 'cry'"),
-    ("[fixed]\nworld = 'there-is-none.glb'\n[axes]\nseed = [1]\n", "line 2: there is no world"),
-    ("[axes]\nworld = ['tiny', 'tiny field_width=900']\n", "line 2: world 'tiny field_width=900': field_width is 900"),
-    ("[axes]\nseed = {from=0, to=9999}\noffset-m = {from=0, to=1, count=9999}\n", "asks for 99,990,000 runs; ask for 1,000,000 at most"),
-    ("[axes]\nseed = {from=0, to=1e308}\n", "line 2: the range"),
-    ("[axes]\noffset-m = {from=-1e308, to=1e308, count=3}\n", "line 2: the range"),
-    ("[axes]\noffset-m = {from=0, to=1, step=5e-324}\n", "line 2: the range"),
-    (f"[axes]\nseed = {{from=0, to=1{'0' * 400}}}\n", "line 2: a range is"),
-    (f"[axes]\noffset-m = [1{'0' * 400}]\n", "line 2: offset-m is 1000"),
-    ("[axes]\n" + "".join(f"{name} = {{from=1, to=99999}}\n" for name in ("seed", "world-seed", "route-seed", "every")), "asks for 99,9"),
-    ("[axes]\noffset-m = [0]\noffset_m = [0.1, 0.2]\n", "line 2: offset_m is there twice; leave one out"),
-    ("[axes]\nrenderer = ['cpu', 'gpu']\n", "line 2: unknown renderer 'gpu'"),
-    ("[axes]\nroute-length-m = [1, 0.05]\n", "line 2: a route of 0.05 m"),
-    ("[fixed]\nroute = '.'\n[axes]\nseed = [1]\n", "line 2: there is no route"),
-    ("[axes]\nwho = [{model = 'rbm'}, {encoding = 'grey'}]\n", "line 2: all choices of who set the same: model"),
-]  # fmt: skip
+def test_a_scheduler_that_is_not_there_is_reported(capfd, tmp_path, monkeypatch):
+    monkeypatch.setattr("tussock.navigation.sweeps.sweep.SECONDS", 0.5)
+    flags = ["--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9"]
+    code, _, err = tussock(capfd, "sweep", written(tmp_path, SWEEP), *flags)
+    assert code == 2
+    last = err.splitlines()[-1]
+    assert all(word in last for word in ("no Dask scheduler", "tcp://127.0.0.1:9", "dask scheduler"))
 
 
-@pytest.mark.parametrize(("text", "message"), REFUSED)
-def test_what_cannot_be_run_is_refused_with_its_line(text, message, tmp_path):
-    path = written(tmp_path, text)
-    with pytest.raises(InputError) as refused:
-        read_sweep(path)
-    assert str(refused.value).startswith(str(path))
-    assert message in str(refused.value)
+# Reports
 
 
-def test_a_sweep_file_is_all_combinations_of_its_choices(tmp_path):
-    path = written(
-        tmp_path,
-        HEAD + "[axes]\nlearner = [{model = 'rbm', encoding = 'grey'}, {model = 'chain', encoding = 'sky'}]\n"
-        "offset_m = {from = -0.2, to = 0.2, count = 3}\nseed = {from = 3, to = 7, step = 2}\nscan-deg = [90]\n",
-    )
-    runs = list(read_sweep(path).runs())
-    assert [(run.model, run.encoding, run.offset_m, run.seed) for run in runs[:4]] == [
-        ("rbm", "grey", -0.2, 3), ("rbm", "grey", -0.2, 5), ("rbm", "grey", -0.2, 7), ("rbm", "grey", 0.0, 3),
-    ]  # fmt: skip
-    assert (len(runs), runs[-1].model, runs[-1].seed) == (18, "chain", 7)
-    assert {(run.world, run.size, run.scan_deg, run.threads) for run in runs} == {("tiny", "60x12", 90.0, 1)}
-
-
-def test_keys_tell_apart_what_is_different_and_nothing_else(tmp_path):
-    first = RunOptions(world="tiny", world_seed=1, seed=2, route_seed=1)
-    assert run_key(first) == run_key(RunOptions(world="tiny", world_seed=1, seed=2, route_seed=1))
-    noisy = RunOptions(world="tiny", world_seed=1, seed=2, route_seed=1, heading_noise_deg=3.0)
-    assert run_key(noisy) != run_key(first)
-    assert lesson_key(noisy) == lesson_key(first)
-    other = RunOptions(world="tiny", world_seed=1, seed=3, route_seed=1)
-    assert lesson_key(other) != lesson_key(first)
-    assert path_key(other) == path_key(first)
-    route = tmp_path / "route.csv"
-    keys = set()
-    for text in ("x_m,y_m\n0,0\n1,1\n", "x_m,y_m\n0,0\n1,2\n"):
-        route.write_text(text)
-        keys.add(run_key(RunOptions(world="tiny", route=route)))
-    assert len(keys) == 2  # it is the content of a file that counts, wherever it lies
-
-
-def kept(key: str, settings: dict, *, again: bool = False, **row) -> Finished:
-    return Finished(key=key, settings=settings, row=settings | row, steps="x_m\n0\n", again=again)
-
-
-def test_settings_have_one_row_the_newest(tmp_path):
-    with Store(tmp_path) as store:
-        store.add([kept("a", {"route": "r.csv"}, steps=1), kept("b", {"route": "s.csv"}, steps=2)])
-        store.add([kept("c", {"route": "r.csv"}, steps=3)])  # the file holds another route now
-        assert {key: row["steps"] for key, row in store.rows().items()} == {"b": 2, "c": 3}
-
-
-def test_what_could_not_be_done_is_a_row_and_tried_again(tmp_path):
-    run = RunOptions(world="tiny")
-    first = finished_run(run, "a", InputError("no EGL on this machine"))
-    with Store(tmp_path) as store:
-        store.add([first])
-        assert store.finished() == set()
-        assert store.rows()["a"]["error"] == "no EGL on this machine"
-        store.add([finished_run(run, "a", Walked(found={"arrived": True}, steps="", seconds=1, learn_seconds=1))])
-        assert store.finished() == {"a"}
-        assert store.rows()["a"]["error"] is None
-        outside = Walked(refused="the start is outside", found={}, steps="", seconds=0, learn_seconds=1)
-        store.add([finished_run(run, "b", outside)])
-        assert store.finished() == {"b"}  # of the same settings; and it stays outside
-
-
-def test_files_of_a_sweep_are_found_from_everywhere(tmp_path, monkeypatch):
-    (tmp_path / "route.csv").write_text("x_m,y_m\n0,0\n1,1\n")
-    written(tmp_path, "[fixed]\nroute = 'route.csv'\n[axes]\nseed = [1]\n")
-    monkeypatch.chdir(tmp_path)
-    (run,) = read_sweep(Path("sweep.toml")).runs()
-    assert run.route == tmp_path / "route.csv"
-
-
-@pytest.mark.parametrize("damage", ["middle", "columns", "killed"])
-def test_a_damaged_folder_is_said_in_one_line(tmp_path, damage, swept):
-    out = tmp_path / "out"
-    shutil.copytree(swept, out)
-    path = out / "finished.sqlite"
-    if damage == "middle":
-        whole = bytearray(path.read_bytes())
-        whole[4096:-4096] = b"\xa5" * (len(whole) - 8192)
-        path.write_bytes(whole)
-    elif damage == "columns":
-        path.unlink()
-        with closing(sqlite3.connect(path)) as database:
-            database.execute("CREATE TABLE runs (key TEXT)")
-    else:  # in the middle of a transaction
-        script = (
-            "import os, sqlite3, sys; d = sqlite3.connect(sys.argv[1]); d.execute('PRAGMA cache_size=1')\n"
-            "d.execute('UPDATE runs SET row = hex(zeroblob(100000))'); os._exit(0)"
-        )
-        subprocess.run([sys.executable, "-c", script, path], check=True)
-        assert (out / "finished.sqlite-journal").stat().st_size > 0
-    done = subprocess.run([TUSSOCK, "report", out, "--worst", "0"], capture_output=True, text=True)
-    if damage == "killed":
-        assert done.returncode == 0, done.stderr  # what was finished before is all there
-    else:
-        assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
-        assert "finished.sqlite cannot be used" in done.stderr
-
-
-def test_a_recording_of_another_walk_does_not_stay(swept, tmp_path):
-    with Store(swept, read_only=True) as store:
-        row = next(iter(store.rows().values()))
-    run = options_of(row)
-    record_again(run, row, tmp_path / "here")
-    assert (tmp_path / "here" / "recording.rrd").exists()
-    for _ in range(2):  # the second time, too
-        with pytest.raises(InputError, match=r"went another way \(steps\)"):
-            record_again(run, row | {"steps": row["steps"] + 1}, tmp_path / "here")
-        assert not (tmp_path / "here").exists()
-
-
-def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
-    rows = {
-        str(k): {"seed": k % 5, "model": "ab"[k % 2], "route": None if k % 3 else "r", "error": None} for k in range(20)
-    }
-    shuffled = dict(np.random.default_rng(0).permutation(list(rows.items())).tolist())
-    assert table_of(shuffled).equals(table_of(rows))
-
-
-def test_the_report_of_a_sweep_has_everything(swept):
+def test_the_report_of_a_sweep_stands_by_itself(swept):
     done = subprocess.run([TUSSOCK, "report", swept, "--json"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
@@ -452,16 +558,3 @@ def test_a_folder_without_a_sweep_has_no_report(tmp_path):
     done = subprocess.run([TUSSOCK, "report", tmp_path], capture_output=True, text=True)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert "holds no sweep" in done.stderr
-
-
-def test_a_scheduler_that_is_not_there_is_said(tmp_path):
-    path = written(tmp_path, SWEEP)
-    done = subprocess.run(
-        [TUSSOCK, "sweep", path, "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9"],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].startswith(
-        "tussock: no Dask scheduler answers at tcp://127.0.0.1:9; start one with"
-    )

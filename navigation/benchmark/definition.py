@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, product
 
 import numpy as np
 
@@ -18,15 +18,22 @@ from ..stopping import StoppingRules
 from ..sweeps.spec import Sweep
 from ..training_setup import TrainingSetup
 
-# All settings of a run stand here, in `Benchmark.sweep`, or are what entries differ in: no default is relied on.
+# All settings of a run are given here, in `Benchmark.sweep`, or by the entry, so that no default is relied on.
 BASE = Experiment(
+    world_seed=None,
+    cull_back_faces=False,
+    route=None,
+    route_seed=None,
     eye=Eye(width=360, height=75, samples=1, z=0.01, top=math.radians(60.0), bottom=math.radians(-15.0)),
     encoding="edges",
     navigator="scan",
     route_length=8.0,
     training=TrainingSetup(spacing=0.4, every=1, learning_walk=0.2),
     body=Body(step_length=0.05),
-    stopping=StoppingRules(arrival_radius=0.15, max_deviation=0.5, patience=3.0, max_steps=None, waypoint_spacing=0.1),
+    stopping=StoppingRules(
+        arrival_radius=0.15, max_deviation=0.5, patience=3.0, max_steps=None, put_back=False, waypoint_spacing=0.1
+    ),
+    device="cpu",
     renderer="cpu",
     threads=1,
 )
@@ -69,6 +76,13 @@ class Benchmark:
         for _, group in groupby(self.sweep(encoding=encoding).experiments, key=lambda run: (run.world, run.seed)):
             yield list(group)
 
+    def asked(self) -> list[tuple[str, int, float, float]]:
+        """World, seed, noise (degrees) and displacement (m) of every run, in their order."""
+        return [
+            (world, seed, noise, displacement)
+            for (world, seed), noise, displacement in product(self.worlds, self.noises_deg, self.displacements)
+        ]
+
     def chain(self, encoding: str = ENCODING) -> str:
         """An encoding with all its steps."""
         return str(self.base.replace(encoding=encoding).encoding)
@@ -80,9 +94,8 @@ class Benchmark:
         }
         digest, generated = hashlib.sha256(json.dumps([shared, ENCODING], sort_keys=True).encode()), set()
         for runs in self.by_world():
-            asked = [
-                [settings_of(run)[name] for name in ("world", "seed", "heading_noise_deg", "offset_m")] for run in runs
-            ]
+            names = ("world", "seed", "heading_noise_deg", "offset_m")
+            asked = [[settings[name] for name in names] for settings in map(settings_of, runs)]
             digest.update(json.dumps(asked).encode())
             if runs[0].world in generated:
                 continue

@@ -16,6 +16,7 @@ import tyro
 from tussock.render.eye import Eye
 
 from ..body import Body
+from ..experiment import Experiment
 from ..experiment_settings import TYPES, degrees, experiment_of, surroundings_of
 from ..stopping import StoppingRules
 from ..surroundings import Surroundings
@@ -25,8 +26,6 @@ from .terminal import message_when_slow
 if TYPE_CHECKING:
     from tussock.render.renderer import Renderer
     from tussock.world.scene import World
-
-    from ..experiment import Experiment
 
 WORLD = (
     "A preset's name (tussock-field, meadow, scrub, tiny), generated from a seed; its parameters may follow, as in "
@@ -101,10 +100,10 @@ class LearningOptions(PathOptions):
     """Learn every N-th route view."""
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
-    device: str = "cpu"
+    device: str = default(Experiment, "device")
     """Where the model learns and scans: cpu, cuda, or another device of torch's."""
 
-    def experiment(self) -> "Experiment":
+    def experiment(self) -> Experiment:
         """The experiment that these flags describe. Raises InputError."""
         return experiment_of(self.settings())
 
@@ -113,7 +112,7 @@ class LearningOptions(PathOptions):
 class ModelOptions(LearningOptions):
     """What learns."""
 
-    model: str = "perfect-memory"
+    model: str = default(Experiment, "model")
     """A model's name (see tussock models), or a file that tussock train wrote: it knows its views, encoding and size.
     Parameters may follow the name, as in 'mushroom-body inputs=10 cells=20000' or 'mlp hidden_layer_sizes=100,50'.
     A model of your own is package.module:Class."""
@@ -122,7 +121,7 @@ class ModelOptions(LearningOptions):
     use: str = ""
     """Classes of your own that the file of a model needs, as package.module:Class; several with commas between them."""
 
-    def experiment(self) -> "Experiment":
+    def experiment(self) -> Experiment:
         """The experiment that these flags describe. Raises InputError."""
         if self.use:
             from ..encoding import STEPS
@@ -142,7 +141,7 @@ class RunOptions(ModelOptions):
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
     step_m: float = default(Body, "step_length")
     """Length of a step."""
-    offset_m: float = 0.0
+    offset_m: float = default(Experiment, "start_offset")
     """Start this far to the left of the route (negative: right)."""
     heading_noise_deg: float = degrees(default(Body, "heading_noise"))
     """Standard deviation of the noise on every turn."""
@@ -162,7 +161,7 @@ class RunOptions(ModelOptions):
     """Stuck after walking this far without getting farther along the route."""
     max_steps: int | None = None
     """Limit of steps. Default: as many as three times the route's length needs."""
-    navigator: str = "scan"
+    navigator: str = default(Experiment, "navigator")
     """What steers: scan turns to the most familiar heading. Parameters may follow the name. One of your own is package.module:Class."""
 
 

@@ -27,6 +27,7 @@ from .viewer import check_viewer
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
 FLUSH_SECONDS = 0.5  # what a crash may lose of a recording
+MAX_FLUSH_SECONDS = 120.0  # rerun's writer sometimes ends without an answer where the disk is full
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible ..
 MARKS_ABOVE = 0.04  # m; .. and marks of poor steps above these
 LABEL_SPACING = 0.6  # m; marks of one cause nearer than this to the one with its name have none
@@ -113,7 +114,7 @@ class Recording:
             self._log_events(waiting)
         file, *viewers = self._streams
         try:
-            file.flush()
+            file.flush(timeout_sec=MAX_FLUSH_SECONDS)
         except RuntimeError as error:
             raise DiskFullError(f"{self._path} cannot be written any more ({error}); make room on its disk") from error
         for viewer in viewers:

@@ -1,0 +1,77 @@
+"""The command line in tests: commands in this process or in one of their own, and the keys of what they print with --json."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from tussock.navigation.cli.main import main
+
+TUSSOCK = str(Path(sys.executable).with_name("tussock"))
+
+# Scripts read these: a key may be added, none may go or change its name.
+_STUDY, _DATABASE = {"report", "results", "claims"}, {"database", "type", "images", "rendered", "seconds"}
+KEYS = {
+    "world": {"world", "preset", "seed", "triangles"},
+    "view": {"view", "width", "height", "renderer"},
+    "route": {"route", "length_m", "start", "goal"},
+    "evaluate": {
+        "model", "encoding", "n_views", "n_positions", "median_error_deg", "mean_error_deg", "share_over_45", "seconds",
+    },
+    "train": {"file", "model", "encoding", "n_views", "memory_bytes", "fit_seconds"},
+    "compare": {"encoding", "n_views", "n_positions", "models"},
+    "models": {"models"},
+    "run": {
+        "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "mean_error_deg", "resets", "cause", "poor_steps", "causes",
+        "seconds", "steps_per_second", "recording",
+    },
+    "play": {"recording", "screenshot"},
+    "sweep": {"table", "runs", "done_before", "arrived", "could_not_run", "seconds", "recordings"},
+    "report": {"report", "results", "runs", "could_not_run", "arrived", "mean_deviation_m", "mean_error_deg"},
+    "benchmark": {"results", "table"},
+    "replicate": {"report", "results", "runs", "done_before", "could_not_run", "claims", "seconds"},
+    "replicate thesis": _STUDY,
+    "study": _STUDY,
+    "database grid": _DATABASE,
+    "database route": _DATABASE,
+    "database check": {"database", "type", "images", "problems", "ok"},
+}  # fmt: skip
+
+
+def tussock(capfd, *arguments: Any) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command that runs in this process."""
+    capfd.readouterr()
+    code = 0
+    try:
+        main([str(argument) for argument in arguments])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    return code, *capfd.readouterr()
+
+
+def printed(capfd, *arguments: Any, code: int = 0) -> dict[str, Any]:
+    """What a command in this process prints with --json; it ends with this code."""
+    ended, out, err = tussock(capfd, *arguments, "--json")
+    assert ended == code, err
+    return checked(arguments, out)
+
+
+def process(*arguments: Any, **options: Any) -> subprocess.CompletedProcess:
+    """A command in a process of its own."""
+    return subprocess.run([TUSSOCK, *map(str, arguments)], capture_output=True, text=True, **options)
+
+
+def process_json(*arguments: Any, **options: Any) -> dict[str, Any]:
+    """What a command in a process of its own prints with --json; it succeeds."""
+    done = process(*arguments, "--json", **options)
+    assert done.returncode == 0, done.stderr
+    return checked(arguments, done.stdout)
+
+
+def checked(arguments: tuple[Any, ...], out: str) -> dict[str, Any]:
+    """The one object that a command printed; it has the keys of the command."""
+    result = json.loads(out)
+    first, second = (*map(str, arguments[:2]), "")[:2]
+    assert set(result) == KEYS.get(f"{first} {second}", KEYS.get(first))
+    return result

@@ -1,0 +1,426 @@
+"""Experiments and their flat settings: each other's inverse, with keys that depend on everything that decides a run."""
+
+import dataclasses
+import math
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numba
+import numpy as np
+import pytest
+import torch
+import tyro
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tussock.navigation.body import Body
+from tussock.navigation.cli.main import COMMANDS, choice_of, main
+from tussock.navigation.cli.models import RunCommand
+from tussock.navigation.cli.options import RunOptions
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.experiment import Experiment
+from tussock.navigation.experiment_settings import (
+    OF_PATH,
+    OF_WALK,
+    TYPES,
+    default_settings,
+    experiment_of,
+    key_of,
+    path_key,
+    run_command,
+    settings_of,
+    training_key,
+)
+from tussock.navigation.steering.navigator import Motion
+from tussock.navigation.stopping import StoppingRules
+from tussock.navigation.surroundings import BACKENDS, Surroundings
+from tussock.navigation.training_setup import TrainingSetup
+from tussock.render.eye import Eye
+from tussock.world.errors import InputError, SettingError
+from tussock.world.files import write_world
+from tussock.world.geometry import Route
+from tussock.world.scene import World
+
+ROUTE = "x_m,y_m\n0,0\n1,1\n"
+
+
+def decimals(low: float, high: float) -> st.SearchStrategy[float]:
+    """Decimal fractions, as people write them."""
+    return st.integers(round(low * 1000), round(high * 1000)).map(lambda thousandths: thousandths / 1000)
+
+
+SEEDS, POSITIVE = st.integers(0, 2**62), st.floats(1e-3, 1e3)
+VALUES: dict[str, st.SearchStrategy] = {
+    "world": st.sampled_from(["tiny", "meadow", "scrub", "tussock-field field_width=20", "tiny grass_density=3.5"]),
+    "world_seed": SEEDS,
+    "seed": SEEDS,
+    "size": st.sampled_from(["60x12", "180x40", "1000x90", "8x3"]),
+    "renderer": st.sampled_from(BACKENDS),
+    "samples": st.integers(1, 4),
+    "eye_height_m": st.floats(-1, 1),
+    "top_deg": decimals(0.001, 90),
+    "bottom_deg": decimals(-90, 0),
+    "cull_back_faces": st.booleans(),
+    "route": st.just("route.csv"),
+    "route_seed": SEEDS,
+    "route_length_m": st.floats(0.1, 100),
+    "spacing_m": POSITIVE,
+    "every": st.integers(1, 100),
+    "learning_walk_m": st.floats(0, 10),
+    "device": st.just("cpu"),
+    "model": st.sampled_from(
+        ["perfect-memory", "infomax rate=baddeley units=none", "mushroom-body inputs=10 cells=200", "chain", "random"]
+    ),
+    "threads": st.integers(1, 64),
+    "step_m": POSITIVE,
+    "offset_m": st.floats(-9, 9),
+    "heading_noise_deg": decimals(0, 90),
+    "scan_deg": decimals(0.001, 360),
+    "scan_about_deg": decimals(-360, 360),
+    "on_lost": st.sampled_from(["stop", "reset"]),
+    "waypoint_m": POSITIVE,
+    "arrive_m": POSITIVE,
+    "lost_m": POSITIVE,
+    "patience_m": POSITIVE,
+    "max_steps": st.integers(1, 10**6),
+    "navigator": st.just("scan"),
+}
+PRESET = st.fixed_dictionaries(
+    {"encoding": st.sampled_from(["edges", "grey", "sky"])},
+    optional={"resize": decimals(1, 20), "blur": decimals(0.01, 9)},
+)
+CHAIN = st.sampled_from(
+    ["grey | blur 2.5 | resize 3", "sky-mask", "foreground-mask | widen 3 | normalise", "grey | resize 1"]
+)
+ENCODINGS = PRESET | CHAIN.map(lambda chain: {"encoding": chain}) | st.just({})
+SETTINGS = st.tuples(st.fixed_dictionaries({}, optional=VALUES), ENCODINGS).map(lambda parts: parts[0] | parts[1])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory):
+    """A current folder with a route in it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("folder"))
+        Path("route.csv").write_text(ROUTE)
+        yield
+
+
+def parsed(arguments: list[str]) -> Any:
+    """A command with its flags."""
+    config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
+    return tyro.cli(choice_of(COMMANDS), args=arguments, config=config)
+
+
+# Settings
+
+
+@given(SETTINGS)
+def test_an_experiment_follows_from_its_settings(given_settings):
+    experiment = experiment_of(given_settings)
+    settings = settings_of(experiment)
+    assert experiment_of(settings) == experiment
+    for name, value in given_settings.items():  # what was given, where it is not as by default in other words
+        if name not in ("encoding", "resize"):
+            assert settings[name] == (value if name != "model" else value.removesuffix(" units=none"))
+
+
+@given(st.floats(0, 2), st.floats(1e-3, 2 * math.pi), st.floats(-9, 9), st.floats(0.01, math.pi / 2))
+def test_angles_in_radians_keep_their_digits(noise, width, about, top):
+    scan = {"width": width, "about": about}
+    experiment = Experiment(body=Body(heading_noise=noise), eye=Eye(top=top))
+    experiment = experiment.replace(navigator=dataclasses.replace(experiment.navigator, parameters=scan))
+    again = experiment_of(settings_of(experiment))
+    angles = [(again.body.heading_noise, noise), (again.eye.top, top)]
+    angles += [(again.navigator.parameters.get(name, math.pi), value) for name, value in scan.items()]
+    for found, expected in angles:
+        assert math.isclose(found, expected, rel_tol=1e-15, abs_tol=1e-300)
+
+
+def test_settings_have_the_names_of_the_flags_of_run():
+    assert list(settings_of(experiment_of({}))) == list(TYPES)
+    flags = {each.name for each in dataclasses.fields(RunOptions)}
+    assert flags - set(TYPES) == {"use"}  # which names classes, and decides nothing
+    assert set(TYPES) <= flags
+    assert {each.name for each in dataclasses.fields(RunCommand)} - flags == {
+        "out",
+        "overwrite",
+        "live",
+        "viewer",
+        "json",
+    }
+
+
+def test_an_unknown_setting_is_refused_by_its_name():
+    with pytest.raises(SettingError, match="'colour'"):
+        experiment_of({"colour": "red"})
+
+
+@pytest.mark.parametrize(
+    "together",
+    [{"size": "60x12", "samples": 64}, {"top_deg": -20.0, "bottom_deg": -60.0}, {"size": "32768x3", "samples": 1}],
+)
+def test_settings_are_checked_together_and_not_against_the_defaults_of_others(together):
+    """Each alone would be refused with the defaults of the others."""
+    eye = experiment_of(together).eye
+    expected = {"top_deg": math.degrees(eye.top), "bottom_deg": math.degrees(eye.bottom), "samples": eye.samples}
+    expected |= {"size": f"{eye.width}x{eye.height}"}
+    assert all(expected[name] == pytest.approx(value) for name, value in together.items())
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"size": "720x150", "samples": 64}, ["720 x 150", "fewer"]),
+        ({"top_deg": -20.0}, ["-15", "-20"]),
+        ({"on_lost": "cry"}, ["'cry'", "stop or reset"]),
+        ({"scan_deg": 400.0}, ["width", "400 degrees"]),
+        ({"navigator": "scan width=1", "scan_deg": 90.0}, ["width", "once"]),
+        ({"every": 0}, ["every", "0"]),
+        ({"renderer": "gpu"}, ["'gpu'", "osmesa"]),
+        ({"model": "oracle"}, ["'oracle'", "perfect-memory"]),
+        ({"model": "infomax units=0"}, ["units", "0"]),
+        ({"model": "no.safetensors"}, ["no.safetensors"]),
+        ({"route": "no.csv"}, ["no.csv"]),
+        ({"world": "no.glb"}, ["no.glb"]),
+        ({"device": "abacus"}, ["'abacus'"]),
+        ({"encoding": "grey | resize 3", "blur": 1.0}, ["blur", "chain"]),
+    ],
+)
+def test_what_makes_no_sense_is_refused_where_the_experiment_is_made(settings, words):
+    with pytest.raises(InputError) as refused:
+        experiment_of(settings)
+    assert all(word in str(refused.value) for word in words), refused.value
+    assert "\n" not in str(refused.value)
+
+
+# Keys
+
+OTHER: dict[str, Any] = {
+    "world": "meadow", "world_seed": 5, "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
+    "top_deg": 50.0, "bottom_deg": -20.0, "cull_back_faces": True, "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
+    "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "device": "cpu:0",
+    "model": "infomax", "threads": 1, "step_m": 0.1, "offset_m": 0.1, "heading_noise_deg": 5.0, "scan_deg": 90.0, "scan_about_deg": 10.0,
+    "on_lost": "reset", "waypoint_m": 0.2, "arrive_m": 0.1, "lost_m": 0.6, "patience_m": 2.0, "max_steps": 9,
+}  # fmt: skip
+
+
+class Ahead:
+    """A navigator without a model that walks straight on."""
+
+    def learn(self, views):
+        pass
+
+    def begin(self):
+        return None
+
+    def decide(self, look, memories):
+        return Motion(turn=np.zeros(len(look)))
+
+
+def test_the_keys_differ_where_a_setting_differs(tmp_path):
+    assert set(OTHER) == set(TYPES) - {"navigator"}
+    base = experiment_of({})
+    others = {name: experiment_of({name: value}) for name, value in OTHER.items()}
+    others["navigator"] = experiment_of({"navigator": f"{__name__}:Ahead"})
+    assert len({key_of(base), *map(key_of, others.values())}) == 1 + len(TYPES)
+    for key, names in ((path_key, {*OF_PATH, "seed"}), (training_key, set(TYPES) - set(OF_WALK))):
+        assert {name for name, other in others.items() if key(other) != key(base)} == names
+    # It is the content of a file that counts.
+    Path(tmp_path / "route.csv").write_text("x_m,y_m\n0,0\n1,2\n")
+    elsewhere = experiment_of({"route": tmp_path / "route.csv"})
+    assert key_of(elsewhere) != key_of(others["route"])
+    Path(tmp_path / "route.csv").write_text(ROUTE)
+    assert key_of(elsewhere) == key_of(others["route"])
+
+
+SAME = [
+    ({}, {"world": "tussock-field", "size": "720x150", "scan_deg": 180.0, "encoding": "edges", "resize": 6.0}),
+    ({"seed": 4}, {"seed": 4, "world_seed": 4, "route_seed": 4}),
+    ({"model": "infomax"}, {"model": "infomax rate=z-scored  units=none"}),
+    ({}, {"encoding": "sky-mask | vertical-edges | resize 6 | normalise"}),
+    ({"encoding": "sky-mask"}, {"encoding": "foreground-mask | resize 1"}),
+    ({"route": "route.csv"}, {"route": "route.csv", "route_seed": 3, "route_length_m": 2.0}),
+    ({"route": "route.csv"}, {"route": Path("..") / "route.csv"}),
+    ({"offset_m": 0}, {"offset_m": 0.0, "every": 1}),
+    ({"scan_deg": 90.0}, {"navigator": f"scan width={math.pi / 2}"}),
+]
+
+
+@pytest.mark.parametrize(("first", "second"), SAME)
+def test_the_keys_are_the_same_for_the_same_run_in_other_words(first, second, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "route.csv").write_text(ROUTE)
+    (tmp_path / "here" / "route.csv").write_text(ROUTE)
+    monkeypatch.chdir(tmp_path / "here")
+    for key in (key_of, path_key, training_key):
+        assert key(experiment_of(first)) == key(experiment_of(second))
+
+
+def test_worlds_and_routes_in_memory_have_the_keys_of_their_contents():
+    experiments = [
+        Experiment(world=World.generate("tiny", seed), route=Route.through(np.array([[0.5, 0.5], [1.5, 0.5 + bend]])))
+        for seed, bend in ((0, 0), (0, 0), (1, 0), (0, 1))
+    ]
+    keys = [key_of(experiment) for experiment in experiments]
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 3
+
+
+def test_a_file_that_is_named_like_a_model_or_a_preset_changes_no_key(tmp_path, monkeypatch):
+    settings = [
+        {"world": "tiny", "model": "infomax", "encoding": "grey"},
+        {"world": "tiny grass_density=3", "model": "mlp hidden_layer_sizes=8"},
+    ]
+    before = [key_of(experiment_of(each)) for each in settings]
+    monkeypatch.chdir(tmp_path)
+    for name in ("infomax", "tiny", "grey", "scan", "cpu", "tiny grass_density=3", "mlp hidden_layer_sizes=8"):
+        Path(name).write_bytes(b"something else")
+    assert [key_of(experiment_of(each)) for each in settings] == before
+
+
+@pytest.mark.xfail(
+    strict=True, reason="world.params.is_generated takes a file's name that begins with a preset's for the preset"
+)
+def test_a_world_file_whose_name_begins_with_that_of_a_preset_is_opened(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_world(World.generate("tiny", 3), "tiny world.glb")
+    experiment = experiment_of({"world": "tiny world.glb"})
+    assert np.array_equal(experiment.open_world().triangles, World.generate("tiny", 3).triangles)
+    assert key_of(experiment) == key_of(experiment.replace(world_seed=5))  # which is of generated worlds only
+
+
+def test_a_path_is_a_file_even_where_it_is_named_like_a_preset(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("tiny").write_bytes(b"")
+    experiment = Experiment(world=Path("tiny"))
+    assert experiment_of(settings_of(experiment)) == experiment
+    assert key_of(experiment) != key_of(experiment.replace(world="tiny"))
+
+
+# The command that repeats a run
+
+
+@given(SETTINGS)
+def test_the_command_of_a_run_repeats_it(given_settings):
+    experiment = experiment_of(given_settings)
+    program, *arguments = shlex.split(run_command(experiment, "the folder"))
+    command = parsed(arguments)
+    assert program == "tussock"
+    assert isinstance(command, RunCommand)
+    assert command.out == Path("the folder")
+    assert command.experiment() == experiment
+
+
+def test_the_command_names_only_what_is_not_as_by_default():
+    assert run_command(Experiment(), "run") == "tussock run --out run"
+    ahead = experiment_of({"navigator": f"{__name__}:Ahead", "cull_back_faces": True, "offset_m": -0.1})
+    words = f"--cull-back-faces --offset-m -0.1 --navigator {__name__}:Ahead"
+    assert run_command(ahead, "run") == f"tussock run {words} --out run"
+
+
+# Flags
+
+
+def test_the_defaults_of_the_flags_are_those_of_the_experiment():
+    assert RunOptions().experiment() == Experiment()
+    command = parsed(["run"])
+    assert command.experiment() == Experiment()
+    for each in dataclasses.fields(RunOptions):
+        assert each.default in (None, default_settings().get(each.name, ""))
+
+
+DEFAULTS = [  # a class of settings, one of its fields, another default, and the flag that shows it
+    (Body, "step_length", 0.07, "step_m", 0.07),
+    (Body, "heading_noise", math.radians(3), "heading_noise_deg", 3.0),
+    (StoppingRules, "max_deviation", 0.7, "lost_m", 0.7),
+    (StoppingRules, "waypoint_spacing", 0.3, "waypoint_m", 0.3),
+    (TrainingSetup, "spacing", 0.06, "spacing_m", 0.06),
+    (TrainingSetup, "learning_walk", 0.3, "learning_walk_m", 0.3),
+    (Surroundings, "route_length", 5.0, "route_length_m", 5.0),
+    (Experiment, "model", "infomax", "model", "infomax"),
+    (Experiment, "start_offset", 0.2, "offset_m", 0.2),
+]
+
+
+def test_a_changed_default_of_the_settings_shows_in_the_flags():
+    changes = [(kind.__module__, kind.__name__, field, value) for kind, field, value, _, _ in DEFAULTS]
+    flags = {flag: value for _, _, _, flag, value in DEFAULTS}
+    script = f"""
+from importlib import import_module
+import attrs
+
+changed = attrs.Attribute.__setattr__ and object.__setattr__  # attributes of attrs are frozen
+for module, kind, field, value in {changes!r}:
+    changed(attrs.fields_dict(getattr(import_module(module), kind))[field], "default", value)
+from tussock.navigation.cli.options import RunOptions
+
+flags = RunOptions()
+for flag, value in {flags!r}.items():
+    assert getattr(flags, flag) == value, (flag, getattr(flags, flag))
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+# Running
+
+
+def test_an_experiment_walks_what_tussock_run_walks(tmp_path):
+    experiment = Experiment(
+        world="tiny", seed=2, eye=Eye(width=180, height=40), model="infomax", start_offset=0.1,
+        body=Body(heading_noise=math.radians(5)), stopping=StoppingRules(max_steps=20, put_back=True),
+    )  # fmt: skip
+    before = torch.get_num_threads(), numba.get_num_threads()
+    flags = [
+        "--world",
+        "tiny",
+        "--seed",
+        "2",
+        "--size",
+        "180x40",
+        "--model",
+        "infomax",
+        "--offset-m",
+        "0.1",
+        "--heading-noise-deg",
+        "5",
+    ]
+    main(["run", *flags, "--max-steps", "20", "--on-lost", "reset", "--threads", "1", "--out", str(tmp_path / "run")])
+    assert (torch.get_num_threads(), numba.get_num_threads()) == before  # --threads is of this run alone
+    assert experiment.replace(threads=1).run().to_csv() == (tmp_path / "run" / "trajectory.csv").read_text()
+
+
+def test_progress_is_reported_while_it_walks():
+    reported = []
+    experiment = Experiment(world="tiny", eye=Eye(width=60, height=12), stopping=StoppingRules(max_steps=3))
+    trajectory = experiment.run(lambda done, of: reported.append((done, of)))
+    assert reported == [(k, 3) for k in range(len(trajectory))]
+
+
+def test_a_navigator_without_a_model_walks(tmp_path):
+    """One from outside: nothing is measured about learned views."""
+    experiment = experiment_of({"world": "tiny", "size": "60x12", "navigator": f"{__name__}:Ahead", "max_steps": 60})
+    trajectory = experiment.run()
+    headings = {round(heading, 9) for heading in trajectory.column("heading_deg")}
+    assert len(headings) == 1
+    assert trajectory.summary()["poor_steps"] > 0
+
+
+def test_nothing_changes_an_experiment():
+    experiment = Experiment(world="tiny")
+    with pytest.raises(attrs.exceptions.FrozenInstanceError):
+        experiment.seed = 3
+    changed = experiment.replace(seed=3, body__heading_noise=0.1, training__every=2)
+    assert (changed.seed, changed.body.heading_noise, changed.training.every) == (3, 0.1, 2)
+    assert (experiment.seed, experiment.body.heading_noise, experiment.training.every) == (0, 0.0, 1)
+
+
+@given(SETTINGS)
+def test_an_encoding_is_the_same_from_its_text(given_settings):
+    """What a command prints as its encoding can be given back to it."""
+    encoding = experiment_of(given_settings).encoding
+    assert experiment_of({"encoding": str(encoding)}).encoding == encoding == Encoding.parse(str(encoding))
