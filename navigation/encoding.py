@@ -4,6 +4,7 @@
 """
 
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 import attrs
@@ -76,7 +77,15 @@ class Encoding:
         return (images.shape[1], images.shape[2]), low, high
 
     def __str__(self) -> str:
-        texts = [" ".join([label(step), *(f"{value:.15g}" for value in parameters_of(step))]) for step in self.steps]
+        return self._text(STEPS.name_of)
+
+    def text_in_files(self) -> str:
+        """The chain with the location of each class from outside: a name may mean another class in another process."""
+        return self._text(STEPS.name_in_files)
+
+    def _text(self, name_of: Callable[[type], str]) -> str:
+        steps = [[name_of(type(step)), *(f"{value:.15g}" for value in parameters_of(step))] for step in self.steps]
+        texts = list(map(" ".join, steps))
         return " | ".join(texts if len(texts) != 1 else [*texts, "resize 1"])  # one word alone may be a preset's name
 
     @classmethod
@@ -120,7 +129,7 @@ class Encoding:
 
 def label(step: Any) -> str:
     """The name of a step in a chain."""
-    return getattr(step, "name", "") or STEPS.name_of(type(step))
+    return STEPS.name_of(type(step))
 
 
 def parameters_of(step: Any) -> list[float]:

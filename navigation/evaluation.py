@@ -155,10 +155,10 @@ def errors_of_views(
     model: FamiliarityModel,
     views: Iterable[Images],
     route: Route,
-    poses: Float[np.ndarray, "n 3"],
+    poses: Float[np.ndarray, "m 3"],
     *,
     scan: float = 2 * np.pi,
-    about: Float[np.ndarray, " n"] | None = None,
+    about: Float[np.ndarray, " m"] | None = None,
     progress: Progress = no_progress,
 ) -> HeadingErrors:
     """`heading_errors` from encoded views, in batches, that were taken at poses; see `recovered_headings` for the scan."""

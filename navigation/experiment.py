@@ -62,11 +62,12 @@ def _model(value: Any) -> Any:
         if not Path(value).is_file():
             raise FileError(f"there is no model file {value}; check the name")
         return Path(value)
-    if isinstance(value, str):
-        from .models import model_spec
+    if isinstance(value, Spec):
+        return value
+    from .models import MODELS, model_spec
+    from .models.opponents import Opponent
 
-        return model_spec(value)
-    return value if isinstance(value, Spec) else Spec.of(value)
+    return model_spec(str(value)) if isinstance(value, str | Opponent) else MODELS.spec_of(value)
 
 
 def _navigator(value: Any) -> Any:

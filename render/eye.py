@@ -1,13 +1,14 @@
 """The eye: which part of the sphere a panorama shows, and how finely."""
 
 import math
-
-import numpy as np
-from jaxtyping import Float
+from typing import TYPE_CHECKING
 
 from tussock.world.errors import SettingError
-from tussock.world.geometry import MAX_COORDINATE
-from tussock.world.settings import number, settings, whole
+from tussock.world.settings import MAX_COORDINATE, number, settings, whole
+
+if TYPE_CHECKING:  # the command line reads the defaults: without numpy, its help appears at once
+    import numpy as np
+    from jaxtyping import Float
 
 MAX_RAYS = 10**8  # of a panorama; the CPU renderer uses 12 bytes a ray and thread
 
@@ -48,7 +49,9 @@ class Eye:
         """Rays along each side of a pixel: `samples`, or its default for this width."""
         return self.samples or (1 if self.width >= 360 else 4)
 
-    def elevations(self, rays: int = 1) -> Float[np.ndarray, " height_rays"]:
+    def elevations(self, rays: int = 1) -> 'Float[np.ndarray, " height_rays"]':
         """Elevations of evenly spaced rows of rays (rad), from top to bottom, `rays` of them in each row of pixels."""
+        import numpy as np
+
         n = self.height * rays
         return self.top - (np.arange(n) + 0.5) * (self.top - self.bottom) / n

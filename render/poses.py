@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import SettingError
-from tussock.world.geometry import MAX_COORDINATE, Pose
+from tussock.world.geometry import Pose
+from tussock.world.settings import MAX_COORDINATE
 
 Poses = Float[np.ndarray, "n 3"] | Sequence[Pose | Sequence[float] | Float[np.ndarray, "3"]]
 Views = UInt8[np.ndarray, "n height width 4"]

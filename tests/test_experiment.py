@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import numba
 import numpy as np
 import pytest
 import torch
@@ -282,9 +281,6 @@ def test_a_file_that_is_named_like_a_model_or_a_preset_changes_no_key(tmp_path, 
     assert [key_of(experiment_of(each)) for each in settings] == before
 
 
-@pytest.mark.xfail(
-    strict=True, reason="world.params.is_generated takes a file's name that begins with a preset's for the preset"
-)
 def test_a_world_file_whose_name_begins_with_that_of_a_preset_is_opened(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_world(World.generate("tiny", 3), "tiny world.glb")
@@ -374,7 +370,7 @@ def test_an_experiment_walks_what_tussock_run_walks(tmp_path):
         world="tiny", seed=2, eye=Eye(width=180, height=40), model="infomax", start_offset=0.1,
         body=Body(heading_noise=math.radians(5)), stopping=StoppingRules(max_steps=20, put_back=True),
     )  # fmt: skip
-    before = torch.get_num_threads(), numba.get_num_threads()
+    before = torch.get_num_threads()
     flags = [
         "--world",
         "tiny",
@@ -390,7 +386,7 @@ def test_an_experiment_walks_what_tussock_run_walks(tmp_path):
         "5",
     ]
     main(["run", *flags, "--max-steps", "20", "--on-lost", "reset", "--threads", "1", "--out", str(tmp_path / "run")])
-    assert (torch.get_num_threads(), numba.get_num_threads()) == before  # --threads is of this run alone
+    assert torch.get_num_threads() == before  # --threads is of this run alone
     assert experiment.replace(threads=1).run().to_csv() == (tmp_path / "run" / "trajectory.csv").read_text()
 
 

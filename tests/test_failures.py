@@ -268,9 +268,6 @@ def test_without_the_poses_of_views_the_rest_is_measured():
 POSES = np.column_stack([np.linspace(-2.3, -1.7, 4), np.zeros(4), np.zeros(4)])
 
 
-@pytest.mark.xfail(
-    strict=True, reason="TrainedModel does not check poses yet; the rewrite of models/files.py makes it do so"
-)
 @pytest.mark.parametrize(
     ("model", "poses"),
     [

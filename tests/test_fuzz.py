@@ -50,7 +50,7 @@ def test_names_that_would_leave_a_copy_are_refused(tmp_path):
         with pytest.raises(InputError, match=r"line 2: .* is not in the folder"):
             read_database(folder)
     (folder / ENTRIES).write_text('X [mm], Y [mm], Filename\n1, 2, "a\nb.png"\n')
-    with pytest.raises(InputError, match="is no file's name"):
+    with pytest.raises(InputError, match="not a valid file name"):
         read_database(folder)
 
 
@@ -62,7 +62,7 @@ def test_a_sheet_of_many_columns_is_refused(tmp_path):
 
 def test_an_image_that_unpacks_to_gigabytes_is_refused(tmp_path):
     cv2.imwrite(str(tmp_path / "bomb.png"), np.zeros((8_001, 10_000), np.uint8))
-    with pytest.raises(InputError, match="10000 x 8001; images have up to 80,000,000 pixels"):
+    with pytest.raises(InputError, match=r"10000 x 8001; .* 80,000,000 pixels"):
         read_image(tmp_path / "bomb.png")
 
 

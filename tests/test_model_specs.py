@@ -40,7 +40,7 @@ def values(default: Any, metadata: Any) -> st.SearchStrategy:
         return st.lists(values(default[0], metadata), min_size=1, max_size=4).map(tuple)
     low, high = metadata["low"], metadata["high"]
     if default is None or isinstance(default, int):
-        whole = st.integers(int(low), int(min(high, 300)))
+        whole = st.integers(int(low), int(min(high, 100)))
         return whole | st.none() if default is None else whole
     numbers = st.floats(max(low, -1e300), min(high, 1e300))
     return numbers | st.sampled_from([*RATES]) if isinstance(default, str) else numbers

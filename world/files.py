@@ -13,11 +13,12 @@ import numpy as np
 
 from .atomic import replacing
 from .errors import FileError, InputError
-from .geometry import MAX_COORDINATE, Bounds
+from .geometry import Bounds
 from .mesh_materials import face_rgb, texture_of
 from .params import WORLDS, check_preset, is_generated
 from .route_files import existing_file, first_line, naming, read_planes
 from .scene import Ground, World
+from .settings import MAX_COORDINATE
 
 KEY = "tussock"  # of the data in a file that a mesh cannot hold
 DEFAULT_SKY = (191, 191, 191)

@@ -18,8 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .errors import SettingError
-
-MAX_COORDINATE = 1e7  # m from 0: beyond it float32 corners are metres apart, and squares of squares may overflow
+from .settings import MAX_COORDINATE
 
 
 def wrap_angle(angle):

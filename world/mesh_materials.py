@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
 from .errors import FileError
-from .geometry import MAX_COORDINATE
+from .settings import MAX_COORDINATE
 
 
 def texture_of(mesh) -> Any:

@@ -194,7 +194,10 @@ def check_preset(text: str) -> None:
     """
     spec = WORLDS.spec(text)
     if getattr(spec.target, "func", spec.target) is WorldParams:
-        spec.make()
+        try:
+            spec.make()
+        except SettingError as error:
+            raise SettingError(f"world {text!r}: {error}") from error
 
 
 def preset_of(params: WorldParams) -> str | None:

@@ -5,11 +5,11 @@ import sys
 from collections.abc import Mapping
 from functools import cached_property
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import Any
 
 from .errors import SettingError
-from .specs import Spec, parse_spec
+from .specs import Spec, own_parameters, parse_spec
 
 LOCATION = re.compile(r"\w+(\.\w+)*:\w+")  # `package.module:Class`, the name of anything that is not registered
 
@@ -44,26 +44,29 @@ class Registry:
         return list(dict.fromkeys([*self.builtin, *self._registered, *self._installed]))
 
     def __contains__(self, name: str) -> bool:
-        return name in self.builtin or name in self._registered or name in self._installed
+        return name in {*self.names, *map(location_of, self._registered.values()), *map(self.where, self._installed)}
 
     def find(self, name: str, *, importing: bool = True) -> Any:
         """The class or function of a name.
 
         Args:
             name: A known name, or a location.
-            importing: Whether a location may be imported; it is a known name from then on.
+            importing: Whether a location may be imported that is not yet known; it is a known name from then on.
 
         Raises:
             SettingError: For a name that is unknown or cannot be imported. It lists the known names.
         """
         if name in self.builtin:
             return _load(self.builtin[name])
-        if name not in self and importing and LOCATION.fullmatch(name):
+        for registered, target in self._registered.items():
+            if name in (registered, location_of(target)):
+                return target
+        for point in self._installed.values():
+            if name in (point.name, point.value):
+                return self._open(point)
+        if importing and LOCATION.fullmatch(name):
             self._registered[name] = self._import(name)
-        if name in self._registered:
             return self._registered[name]
-        if name in self._installed:
-            return self._open(self._installed[name])
         hint = "import it first" if LOCATION.fullmatch(name) else "or package.module:Class"
         raise SettingError(f"unknown {self.kind} {name!r}; known: {', '.join(self.names)}, {hint}")
 
@@ -82,20 +85,35 @@ class Registry:
         except SettingError as error:
             raise error if repr(text) in str(error) else SettingError(f"{self.kind} {text!r}: {error}") from error
 
+    def spec_of(self, thing: Any) -> Spec:
+        """The spec of a class, or of an object that keeps its parameters under their names."""
+        target = thing if isinstance(thing, type) else type(thing)
+        defaults = own_parameters(target)
+        given = {} if thing is target else {name: getattr(thing, name) for name in defaults}
+        return Spec(
+            self.name_of(target), target, {key: value for key, value in given.items() if value != defaults[key]}
+        )
+
     def name_of(self, target: Any) -> str:
         """The name of a class or function, or its location if it has none."""
         for name, registered in self._registered.items():
             if registered is target:
                 return name
-        location = f"{target.__module__}:{target.__qualname__}"
+        location = location_of(target)
         known = {name: point.value for name, point in self._installed.items()} | self.builtin
         return next((name for name, value in known.items() if value == location), location)
 
+    def name_in_files(self, target: Any) -> str:
+        """The name of a class of tussock, the location of any other: what it is called may differ between processes."""
+        location = location_of(target)
+        return next((name for name, value in self.builtin.items() if value == location), location)
+
     @cached_property
-    def _installed(self) -> dict[str, EntryPoint]:
+    def _installed(self) -> dict[str, Any]:
+        """The entry points by their names."""
         return {each.name: each for each in entry_points(group=f"tussock.{self.group}")}
 
-    def _open(self, point: EntryPoint) -> Any:
+    def _open(self, point: Any) -> Any:
         """What an entry point of an installed package refers to."""
         try:
             return point.load()
@@ -115,6 +133,11 @@ class Registry:
                 f"the {self.kind} {location!r} cannot be imported ({error}); give package.module:Class of an installed package, "
                 "or of a file in the current folder"
             ) from error
+
+
+def location_of(target: Any) -> str:
+    """The `module:name` of a class or function; other objects have no name there."""
+    return f"{target.__module__}:{getattr(target, '__qualname__', '')}"
 
 
 def _load(location: str) -> Any:

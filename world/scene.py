@@ -9,9 +9,9 @@ from jaxtyping import Float32, UInt8
 
 from .errors import SettingError
 from .generate import GENERATOR, generate_plants
-from .geometry import MAX_COORDINATE, Bounds
+from .geometry import Bounds
 from .params import WORLDS, WorldParams, preset_of
-from .settings import RGB
+from .settings import MAX_COORDINATE, RGB
 
 
 def check_colour(label: str, value: Any) -> None:

@@ -22,6 +22,7 @@ from .errors import SettingError
 
 T = TypeVar("T")
 RGB = tuple[int, int, int]
+MAX_COORDINATE = 1e7  # m from 0: beyond it float32 corners are metres apart, and squares of squares may overflow
 MAX_WHOLE = 2**62  # what an int64 holds, with room to add; errors do not mention it
 
 

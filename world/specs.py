@@ -31,15 +31,6 @@ class Spec:
     target: Callable[..., Any]
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
-    @classmethod
-    def of(cls, thing: Any) -> "Spec":
-        """The spec of a class, or of an object that keeps its parameters under their names."""
-        target = thing if isinstance(thing, type) else type(thing)
-        defaults = own_parameters(target)
-        given = {} if thing is target else {name: getattr(thing, name) for name in defaults}
-        name = getattr(target, "name", "") or f"{target.__module__}:{target.__qualname__}"
-        return cls(name, target, {key: value for key, value in given.items() if value != defaults[key]})
-
     def make(self, **more: Any) -> Any:
         """The object.
 

@@ -67,7 +67,7 @@ class Benchmark:
         axes = {
             "world": [{"world": world, "seed": seed} for world, seed in self.worlds],
             "heading_noise": [{"body__heading_noise": math.radians(noise)} for noise in self.noises_deg],
-            "start_offset": [{"start_offset": displacement} for displacement in self.displacements],
+            "start_offset": self.displacements,
         }
         return Sweep.over(self.name, self.base.replace(model=model, encoding=encoding), axes)
 

@@ -128,8 +128,8 @@ class ModelOptions(LearningOptions):
             from ..models import MODELS
 
             for name in filter(None, map(str.strip, self.use.split(","))):
-                MODELS.find(name)
-                STEPS.register(name, MODELS.find(name))
+                for registry in (MODELS, STEPS):
+                    registry.find(name)
         return super().experiment()
 
 

@@ -3,7 +3,6 @@
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import torch
 from jaxtyping import Float32, Float64, UInt8
@@ -157,7 +156,7 @@ def best_stump(bins: UInt8[np.ndarray, "pool samples"], signed: Float64[np.ndarr
     weights = np.abs(signed)
     order = weights.argsort()
     heavy = np.sort(order[np.searchsorted(weights[order].cumsum(), NEGLIGIBLE) :])
-    parts = [part for part in np.array_split(np.arange(len(bins)), numba.get_num_threads()) if len(part)]
+    parts = [part for part in np.array_split(np.arange(len(bins)), torch.get_num_threads()) if len(part)]
     with ThreadPoolExecutor(len(parts)) as threads:
         results = threads.map(lambda part: _edges(bins[part[0] : part[-1] + 1], heavy, signed[heavy]), parts)
     edges, cuts = (np.concatenate(arrays) for arrays in zip(*results, strict=True))

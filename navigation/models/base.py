@@ -110,13 +110,13 @@ class Model(ABC):
         seed: Of everything it draws.
         learned: Named tensors. Together with the parameters they are what a model file holds.
         shape: (h, w) of the views it learned; None before training.
-        name: Its name in the registry.
+        name: Its name in messages; for the models of tussock, that in the registry.
         paper: Where it comes from.
         renamed: Former names of parameters, which specs and files may still use, with the present ones.
         dtypes: Of learned tensors that are not float32; None means any.
     """
 
-    name = ""
+    name = "model"
     paper = ""
     renamed: ClassVar[Mapping[str, str]] = {}
     dtypes: ClassVar[Mapping[str, torch.dtype | None]] = {}
@@ -125,6 +125,9 @@ class Model(ABC):
     seed: int = whole(0, low=0)
     learned: Learned = attrs.field(init=False, repr=False, factory=dict)
     shape: tuple[int, int] | None = attrs.field(init=False, repr=False, default=None)
+
+    def __init_subclass__(cls) -> None:
+        cls.name = vars(cls).get("name", cls.__name__)
 
     def __str__(self) -> str:
         """Its spec: the name, and the parameters that are not the defaults."""
@@ -228,8 +231,7 @@ class Model(ABC):
     def _scan(self, views: Images) -> Scans:
         """Familiarity of each rotation of views that were checked."""
 
-    @abstractmethod
-    def _prepare(self) -> None:
+    def _prepare(self) -> None:  # noqa: B027  # most models need nothing
         """Derive from `learned` what scanning needs. Attributes are replaced, never changed in place (see `restore`)."""
 
 

@@ -16,12 +16,12 @@ from tussock.render.eye import Eye
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, SettingError
 from tussock.world.settings import instance_of, settings
-from tussock.world.specs import Spec, split_words
+from tussock.world.specs import Spec
 
 from ..encoding import OLD_NAMES, STEPS, Encoding
 from .base import FamiliarityModel, Model
 from .checks import check_device, first_line
-from .opponents import OPPONENT
+from .opponents import OPPONENT, Opponent
 from .registry import MODELS
 from .specs import find_model, present_names
 
@@ -83,10 +83,10 @@ def save_model(trained: TrainedModel, path: str | os.PathLike) -> None:
     model.check_learned(model.shape, model.learned)  # type: ignore[arg-type]
     header = {
         "version": VERSION,
-        "model": split_words(str(model))[0],
+        "model": model_in_files(model),
         "parameters": {key: value for key, value in model.parameters.items() if key != "device"},
         "shape": model.shape,
-        "encoding": None if encoding is None else str(encoding),
+        "encoding": None if encoding is None else encoding.text_in_files(),
         "eye": None if eye is None else attrs.asdict(eye),
     }
     tensors = {f"learned.{key}": tensor.detach().cpu().contiguous() for key, tensor in model.learned.items()}
@@ -171,6 +171,13 @@ def _trained(path: Path, header: dict[str, Any], tensors: dict[str, torch.Tensor
     )
 
 
+def model_in_files(model: Model) -> str:
+    """The name of a model's class in a file."""
+    if isinstance(model, Opponent):
+        return OPPONENT + model_in_files(model.attractive)
+    return MODELS.name_in_files(type(model))
+
+
 def _check_known(path: Path, model: str, encoding: str | None) -> None:
     """Refuse a file that needs classes from outside that are not known in this process. Raises FileError."""
     steps = [] if encoding is None else [part.split()[0] for part in encoding.split("|")]
@@ -179,7 +186,7 @@ def _check_known(path: Path, model: str, encoding: str | None) -> None:
         if name not in registry:
             raise FileError(
                 f"{path} needs the {registry.kind} {name!r}, which is not known here; install its package, or name it with "
-                "--use package.module:Class"
+                f"--use {name}"
             )
 
 

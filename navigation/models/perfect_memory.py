@@ -34,6 +34,8 @@ class PerfectMemory(IncrementalModel):
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
         check_scan(views, self.shape)
+        if len(views) == 0:
+            return self.scan(views), torch.empty(0, views.shape[2], dtype=torch.int64)
         familiarity, index = zip(*(self._nearest(self._on_device(batch)) for batch in in_batches(views)), strict=True)
         return torch.cat(familiarity), torch.cat(index)
 

@@ -1,7 +1,5 @@
 """Navigators: what decides, at each look, how an agent turns and steps. One file for each."""
 
-from tussock.world.registry import Registry
+import lazy_loader
 
-__all__ = ["NAVIGATORS"]
-
-NAVIGATORS = Registry("navigators", "navigator", {"scan": "tussock.navigation.steering.scan:Scan"})
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

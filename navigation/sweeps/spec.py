@@ -29,11 +29,24 @@ class Sweep:
         return len(self.experiments)
 
     @classmethod
-    def over(cls, title: str, base: Experiment, axes: Mapping[str, Sequence[Change]]) -> "Sweep":
-        """All combinations of changes of an experiment. Raises InputError for a combination that makes no sense."""
+    def over(cls, title: str, base: Experiment, axes: Mapping[str, Sequence[Any]]) -> "Sweep":
+        """All combinations of changes of an experiment.
+
+        Args:
+            title: In the user's words.
+            base: What all runs share.
+            axes: The choices of each axis: values of the field that the axis is named after, or a `Change` of several fields.
+
+        Raises:
+            InputError: For a combination that makes no sense.
+        """
+        choices = [
+            [choice if isinstance(choice, Mapping) else {name: choice} for choice in of_axis]
+            for name, of_axis in axes.items()
+        ]
         experiments = [
             base.replace(**{name: value for change in changes for name, value in change.items()})
-            for changes in itertools.product(*axes.values())
+            for changes in itertools.product(*choices)
         ]
         return cls(title, axes, experiments)
 

@@ -15,8 +15,8 @@ from jaxtyping import Float, UInt8
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, SettingError
-from tussock.world.geometry import MAX_COORDINATE, Bounds
-from tussock.world.settings import number, numbers, settings, wholes
+from tussock.world.geometry import Bounds
+from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
 
 from ..poses import Poses
 from ..renderer import Renderer

@@ -17,9 +17,9 @@ PERFECT, BODY, INFOMAX, RANDOM = "perfect-memory", "mushroom-body", "infomax", "
 MODELS = (PERFECT, f"{BODY} inputs=10 cells=20000", f"{INFOMAX} rate=unit-range", RANDOM)
 
 
-def _starts(*displacements: float) -> list[dict[str, float]]:
+def _starts(*displacements: float) -> list[float]:
     """Starts at displacements (m) to the left and to the right of the route."""
-    return [{"start_offset": side * each} for each in displacements for side in (1, -1)]
+    return [side * each for each in displacements for side in (1, -1)]
 
 
 def measure(walks: pd.DataFrame) -> StudyResults:
@@ -197,7 +197,7 @@ ARDIN2016 = Protocol(
             arrival_radius=0.2, max_deviation=0.2, max_steps=1000, put_back=True, waypoint_spacing=0.1
         ),
     ),
-    axes={"model": [{"model": model} for model in MODELS], "start_offset": _starts(0.05, 0.10, 0.15, 0.20, 0.25)},
+    axes={"model": MODELS, "start_offset": _starts(0.05, 0.10, 0.15, 0.20, 0.25)},
     worlds=15,
     quick_worlds=2,
     quick_axes={"start_offset": _starts(0.05, 0.15, 0.25)},

@@ -66,9 +66,9 @@ def _no_approach(results: StudyResults) -> Decision:
     return Decision(obtained, None if np.isnan(rank) else rank >= MIN_RANK)
 
 
-def _starts(count: int) -> list[dict[str, Any]]:
+def _starts(count: int) -> list[float]:
     """Starts from one side to the other, evenly spaced."""
-    return [{"start_offset": round(each, 6)} for each in np.linspace(-MAX_START, MAX_START, count).tolist()]
+    return [round(each, 6) for each in np.linspace(-MAX_START, MAX_START, count).tolist()]
 
 
 CLAIMS = (
@@ -146,7 +146,7 @@ AZEVEDO2025 = Protocol(
         body=Body(step_length=STEP),
         stopping=StoppingRules(max_deviation=100.0, patience=100.0, max_steps=round((LENGTH + MAX_START) / STEP)),
     ),
-    axes={"model": [{"model": "perfect-memory"}], "start_offset": _starts(STARTS)},
+    axes={"model": ["perfect-memory"], "start_offset": _starts(STARTS)},
     worlds=75,
     quick_worlds=2,
     quick_axes={"start_offset": _starts(12)},

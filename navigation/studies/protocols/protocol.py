@@ -1,11 +1,12 @@
 """What a published experiment is: its runs, its published parameters, and how its numbers follow from the runs."""
 
 from collections import Counter
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import attrs
 import pandas as pd
 from matplotlib.figure import Figure
 
@@ -61,8 +62,7 @@ class Protocol:
         paper: The paper, as in a list of references.
         question: What the experiment asks, in a sentence.
         experiment: What all runs share.
-        axes: What varies between runs besides the world and route: by name, the choices, as `Experiment.replace` takes them. One of
-            them is "model".
+        axes: What varies between runs besides the world and route, as `Sweep.over` takes it. One axis is "model".
         worlds: Number of worlds, with one route each, where none is given.
         quick_worlds: The same for a first look.
         quick_axes: Axes that have fewer choices in a first look.
@@ -81,15 +81,15 @@ class Protocol:
     paper: str
     question: str
     experiment: Experiment
-    axes: dict[str, list[Change]]
+    axes: dict[str, Sequence[Any]]
     worlds: int = whole()
-    quick_worlds: int = whole()
-    quick_axes: dict[str, list[Change]]
-    parameters: tuple[Parameter, ...]
-    differences: tuple[str, ...]
+    quick_worlds: int = whole(1)
+    quick_axes: dict[str, Sequence[Any]] = attrs.field(factory=dict)
+    parameters: Sequence[Parameter] = ()
+    differences: Sequence[str] = ()
     measure: Callable[[pd.DataFrame], StudyResults]
-    claims: tuple[Claim, ...]
-    items: tuple[Item, ...]
+    claims: Sequence[Claim] = ()
+    items: Sequence[Item]
     of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = lambda row, steps: {}
     world: str = "tussock-field"
 

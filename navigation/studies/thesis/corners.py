@@ -12,7 +12,7 @@ from tussock.world.geometry import Route
 
 from ...encoding import Encoding
 from ...evaluation import RECOVERED_DEG
-from ...failures import REACH
+from ...failures import CHORD
 from ...reports.claims import Claim, Decision
 from ...reports.results import StudyResults
 from . import published
@@ -30,8 +30,8 @@ EVERY_6TH, MORE_IN_CORNERS = "every 6th view", "twice as many in corners"
 
 
 def turning(route: Route) -> Float[np.ndarray, " n"]:
-    """Change of direction at each point of a route (rad, 0 to pi), from the chord of REACH before it to the one after it."""
-    return route.turning(route.arc, REACH)
+    """Change of direction at each point of a route (rad, 0 to pi), from the chord of CHORD before it to the one after it."""
+    return route.turning(route.arc, CHORD)
 
 
 def corner_views(route: Route) -> Int[np.ndarray, " k"]:

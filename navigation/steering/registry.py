@@ -1,0 +1,5 @@
+"""Where the navigators stand, by name."""
+
+from tussock.world.registry import Registry
+
+NAVIGATORS = Registry("navigators", "navigator", {"scan": "tussock.navigation.steering.scan:Scan"})
