@@ -42,11 +42,16 @@ from .render import Eye as Eye
 from .render import Renderer as Renderer
 from .render import open_renderer as open_renderer
 from .world import Bounds as Bounds
+from .world import DiskFullError as DiskFullError
+from .world import FileError as FileError
 from .world import Ground as Ground
 from .world import InputError as InputError
+from .world import MissingDependencyError as MissingDependencyError
 from .world import Pose as Pose
 from .world import Route as Route
+from .world import SettingError as SettingError
 from .world import World as World
+from .world import WorldParams as WorldParams
 from .world import generate_route as generate_route
 from .world import open_world as open_world
 from .world import read_route as read_route
