@@ -111,6 +111,17 @@ class Experiment(Surroundings):
         if isinstance(self.model, Spec):
             self.navigator.make(model=self.make_model())  # refuses bad parameters
 
+    def replace(self, **changes: Any) -> "Experiment":
+        """The same with some fields changed, as for `Surroundings`. With another eye, a preset encoding keeps its number of columns."""
+        from .encoding import PRESETS, Encoding
+
+        changed = super().replace(**changes)
+        name, resize, blur = describe_encoding(self.encoding, self.eye)
+        if changed.eye == self.eye or "encoding" in changes or name not in PRESETS or resize is not None:
+            return changed
+        encoding = Encoding.named(name, resize=automatic_resize(changed.eye), blur=blur)
+        return attrs.evolve(changed, encoding=encoding)
+
     def make_model(self) -> "FamiliarityModel":
         """The untrained model. Raises SettingError where it comes from a file."""
         if isinstance(self.model, Path):

@@ -362,6 +362,14 @@ for flag, value in {flags!r}.items():
     assert done.returncode == 0, done.stderr
 
 
+def test_with_another_eye_a_preset_encoding_keeps_its_number_of_columns():
+    small = Experiment(eye=Eye(width=90, height=20))
+    assert Experiment().replace(eye=small.eye) == small
+    assert Experiment().replace(eye__width=90, eye__height=20) == small
+    chosen = Experiment(encoding=Encoding.named("edges", resize=3))
+    assert chosen.replace(eye=small.eye).encoding == chosen.encoding
+
+
 # Running
 
 
