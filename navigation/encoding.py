@@ -3,7 +3,6 @@
 `Encoding.parse("foreground-mask | vertical-edges | resize 3 | normalise")` and `str(encoding)` are each other's inverse.
 """
 
-import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +13,7 @@ from jaxtyping import Float32
 
 from tussock.world.errors import SettingError
 from tussock.world.registry import Registry
+from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import EncodingStep, Images, Normalise, Resize, Views
@@ -134,13 +134,13 @@ def label(step: Any) -> str:
 
 def parameters_of(step: Any) -> list[float]:
     """The numbers of a step, in their order."""
-    return [getattr(step, name) for name in inspect.signature(type(step)).parameters]
+    return [getattr(step, name) for name in signature_of(type(step)).parameters]
 
 
 def _parse_step(part: str, importing: bool) -> Any:
     name, *texts = part.split() or [""]
     kind = STEPS.find(OLD_NAMES.get(name, name), importing=importing)
-    names = list(inspect.signature(kind).parameters)
+    names = list(signature_of(kind).parameters)
     try:
         values = [float(text) for text in texts]
     except ValueError:

@@ -153,7 +153,7 @@ def heading_errors(
 
 def errors_of_views(
     model: FamiliarityModel,
-    views: Iterable[Images],
+    views: Iterable[Float32[torch.Tensor, "_ h w"]],
     route: Route,
     poses: Float[np.ndarray, "m 3"],
     *,

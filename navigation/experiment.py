@@ -116,8 +116,10 @@ class Experiment(Surroundings):
         from .encoding import PRESETS, Encoding
 
         changed = super().replace(**changes)
+        if changed.eye == self.eye:
+            return changed
         name, resize, blur = describe_encoding(self.encoding, self.eye)
-        if changed.eye == self.eye or "encoding" in changes or name not in PRESETS or resize is not None:
+        if "encoding" in changes or name not in PRESETS or resize is not None:
             return changed
         encoding = Encoding.named(name, resize=automatic_resize(changed.eye), blur=blur)
         return attrs.evolve(changed, encoding=encoding)

@@ -299,7 +299,7 @@ def test_compare_refuses_a_start_outside_the_world_before_it_trains(capfd, monke
 
 def test_models_lists_each_with_a_line_and_its_paper(capfd):
     models = printed(capfd, "models")["models"]
-    assert [*MODELS.builtin, "opponent-..."] == list(models)
+    assert [*MODELS.names, "opponent-..."] == list(models)
     assert all(set(row) == {"what", "paper"} for row in models.values())
     assert all(len(row["what"]) > 20 and row["paper"] for row in models.values())
     assert "Ardin" in tussock(capfd, "models")[1]

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from .errors import SettingError
@@ -42,7 +43,7 @@ class Spec:
         """
         given = {key: value for key, value in more.items() if key not in RESERVED or _takes(self.target, key)}
         try:
-            inspect.signature(self.target).bind(**self.parameters, **given)
+            signature_of(self.target).bind(**self.parameters, **given)
         except TypeError as error:
             raise SettingError(f"{str(self)!r} cannot be made ({error}); give its parameters as name=value") from error
         return self.target(**self.parameters, **given)
@@ -72,11 +73,14 @@ def parse_spec(text: str, find: Callable[[str], Callable[..., Any]]) -> Spec:
     return Spec(name, target, {key: value for key, value in parameters.items() if value != defaults.get(key, ...)})
 
 
+signature_of = cache(inspect.signature)  # a sweep asks for the same few thousands of times
+
+
 def own_parameters(target: Callable[..., Any]) -> dict[str, Any]:
     """The parameters of a class or function that a spec may set, with their defaults (None where it has none)."""
     return {
         name: None if each.default is each.empty else each.default
-        for name, each in inspect.signature(target).parameters.items()
+        for name, each in signature_of(target).parameters.items()
         if name not in RESERVED and each.kind in KEYWORDS
     }
 
@@ -171,5 +175,5 @@ def format_value(value: Any) -> str:
 
 def _takes(target: Callable[..., Any], name: str) -> bool:
     """Whether a class or function takes a keyword."""
-    taken = inspect.signature(target).parameters.values()
+    taken = signature_of(target).parameters.values()
     return any(each.kind is each.VAR_KEYWORD or (each.name == name and each.kind in KEYWORDS) for each in taken)

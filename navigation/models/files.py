@@ -23,7 +23,7 @@ from .base import FamiliarityModel, Model
 from .checks import check_device, first_line
 from .opponents import OPPONENT, Opponent
 from .registry import MODELS
-from .specs import find_model, present_names
+from .specs import find_model, make_model, present_names
 
 HEADER, VERSION = "tussock", 1
 
@@ -119,9 +119,10 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
             raise FileError(
                 f"{path} is a model file of version {header.get('version')}, this is version {VERSION}; train it anew"
             )
-        if expect is not None and header.get("model") != expect:
-            raise FileError(f"{path} holds a model {header.get('model')!r}, not {expect!r}; give another file")
-        return _trained(path, header, tensors, device)
+        trained = _trained(path, header, tensors, device)
+        if expect is not None and header["model"] != model_in_files(make_model(expect)):
+            raise FileError(f"{path} holds a model {header['model']!r}, not {expect!r}; give another file")
+        return trained
     except FileError:
         raise
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError) as error:
