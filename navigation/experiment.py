@@ -136,7 +136,7 @@ class Experiment(Surroundings):
 
     def train(
         self, renderer: "Renderer", route: "Route", progress: Progress = no_progress, *, model: Any = None
-    ) -> "Trained":
+    ) -> "TrainedNavigator":
         """Let a navigator learn the route, unless its model comes from a file.
 
         Args:
@@ -163,7 +163,7 @@ class Experiment(Surroundings):
                 navigator.learn(views)
         model = getattr(navigator, "model", None)
         trained = model and TrainedModel(model=model, encoding=self.encoding, eye=self.eye, poses=poses)
-        return Trained(
+        return TrainedNavigator(
             renderer=renderer, route=route, navigator=navigator, model=trained, poses=poses,
             seconds=time.perf_counter() - began,
         )  # fmt: skip
@@ -202,7 +202,7 @@ class Experiment(Surroundings):
             noise=self.seed,
         )
 
-    def steps(self, trained: "Trained") -> Iterator[tuple["Step", "Diagnosis | None"]]:
+    def steps(self, trained: "TrainedNavigator") -> Iterator[tuple["Step", "Diagnosis | None"]]:
         """Walk: each step as it is made, and what is wrong with it."""
         from .threads import threads
 
@@ -212,7 +212,7 @@ class Experiment(Surroundings):
                 yield step, trained.diagnostics.examine(step)
 
     @contextmanager
-    def opened(self, progress: Progress = no_progress) -> Iterator["Trained"]:
+    def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
         """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
         from .walk import check_inside
 
@@ -241,7 +241,7 @@ class Experiment(Surroundings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trained:
+class TrainedNavigator:
     """A navigator that has learned a route, where it can walk.
 
     Attributes:

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 VERSION = 4  # of what a run does: a change that alters results raises it, and runs that were kept are done again
 
-# Types of the settings, in the order of a table's columns.
+# Types of the settings, in the order of a table's columns. To add one: a field of `Experiment` or of the settings that it consists of,
+# its name here (and in WALK_SETTINGS if it changes only the walk), both directions in `experiment_of` and `settings_of`, and a flag of
+# `RunOptions` in cli/options.py. It is part of the key of a run from then on, so earlier folders of sweeps are not added to.
 TYPES: dict[str, Any] = {
     "world": str, "world_seed": int | None, "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
@@ -41,8 +43,15 @@ TYPES: dict[str, Any] = {
     "offset_m": float, "heading_noise_deg": float, "scan_deg": float | None, "scan_about_deg": float | None, "on_lost": str,
     "waypoint_m": float, "arrive_m": float, "lost_m": float, "patience_m": float, "max_steps": int | None, "navigator": str,
 }  # fmt: skip
-OF_PATH = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m")  # decide world and route
-OF_WALK = (  # decide the walk alone, not what is learned before
+ROUTE_SETTINGS = (
+    "world",
+    "world_seed",
+    "cull_back_faces",
+    "route",
+    "route_seed",
+    "route_length_m",
+)  # decide world and route
+WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
 )  # fmt: skip
 
@@ -78,7 +87,7 @@ def surroundings_of(settings: Mapping[str, Any]) -> Surroundings:
 
 
 def settings_of(experiment: Experiment) -> dict[str, Any]:
-    """The settings that describe an experiment, by the names of TYPES; those that follow from others are None."""
+    """The settings that describe an experiment, by the names of TYPES; those that are derived from others are None."""
     eye, training, body, stopping = experiment.eye, experiment.training, experiment.body, experiment.stopping
     encoding, resize, blur = describe_encoding(experiment.encoding, eye)
     navigator, parameters = experiment.navigator, dict(experiment.navigator.parameters)
@@ -143,14 +152,14 @@ def key_of(experiment: Experiment) -> str:
     return _digest(experiment, TYPES)
 
 
-def path_key(experiment: Experiment) -> str:
-    """The same, of its world and route."""
-    return "path-" + _digest(experiment, OF_PATH)
+def route_key(experiment: Experiment) -> str:
+    """A digest of what decides the world and the route of a run."""
+    return "path-" + _digest(experiment, ROUTE_SETTINGS)
 
 
 def training_key(experiment: Experiment) -> str:
-    """The same, of what is learned before the walk."""
-    return "training-" + _digest(experiment, [name for name in TYPES if name not in OF_WALK])
+    """A digest of what decides the training of a run."""
+    return "training-" + _digest(experiment, [name for name in TYPES if name not in WALK_SETTINGS])
 
 
 def degrees(angle: float) -> float:
@@ -220,8 +229,8 @@ def _encoding(given: Mapping[str, Any], eye: Eye, trained: "TrainedModel | None"
     from .encoding import PRESETS, Encoding
 
     known = trained.encoding if trained is not None else None
-    said = [name for name in ("encoding", "resize", "blur") if given.get(name)]
-    if known is not None and not said:
+    own = [name for name in ("encoding", "resize", "blur") if given.get(name)]
+    if known is not None and not own:
         return known
     name = given.get("encoding", attrs.fields(Experiment).encoding.default)
     automatic = automatic_resize(eye) if name in PRESETS else 1.0
@@ -229,7 +238,7 @@ def _encoding(given: Mapping[str, Any], eye: Eye, trained: "TrainedModel | None"
     if known is not None and encoding != known:
         raise SettingError(
             f"{given['model']} learned views encoded as {str(known)!r}, these settings ask for {str(encoding)!r}; leave out "
-            f"{', '.join('--' + each for each in said)}"
+            f"{', '.join('--' + each for each in own)}"
         )
     return encoding
 

@@ -32,7 +32,9 @@ class Cause(StrEnum):
     UNEXPLAINED = "unexplained"
 
 
-POOR = np.radians(RECOVERED_DEG)  # a heading is poor that is more than this off the route's, and off the way back to it
+POOR = np.radians(
+    RECOVERED_DEG
+)  # a heading is poor if it is more than this from the route's and from the way back to it
 OCCLUDER_DISTANCE = 0.05  # m; an object nearer than this to the eye ..
 MAX_COVERED = 0.25  # .. occludes the view where it covers more than this share of it
 CATCHMENT = 0.25  # m; a learned view gives the heading within this distance
@@ -159,8 +161,8 @@ def walk_cause(along: Sequence[float], causes: Sequence[str], failed: Sequence[b
     """The most frequent cause of a walk's failures, the first of equally frequent ones; None where nothing failed.
 
     The cause of a failure is the most frequent one since its trouble began: since the agent last got RECOVERY farther along the route
-    without a poor step, or was put back. Whatever leads an agent off a route leads it out of the catchment in the end, so that counts
-    only where trouble began with it.
+    without a poor step, or was put back. Every lost agent ends up off the catchment, so that cause
+    counts only where the trouble began with it.
 
     Args:
         along: Distance along the route at each step (m).

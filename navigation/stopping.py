@@ -1,4 +1,4 @@
-"""When a walk along a route ends, and why."""
+"""The limits at which a walk along a route ends, and the reasons; `walk.py` checks them."""
 
 import math
 from enum import StrEnum

@@ -116,7 +116,7 @@ class Walk:
         return [agent for agent in self.agents if not agent.ended]
 
     def steps(self, navigator: Navigator) -> Iterator[list[Step | None]]:
-        """Walk until all have arrived or failed: at a time, one `Step` for each agent; None for those whose walk has ended before."""
+        """Walk until all have arrived or failed. Each time, a list with the `Step` of each agent, or None if its walk has ended."""
         memories = [navigator.begin() for _ in self.agents]
         while walking := self.walking:
             look = self.look()
@@ -156,14 +156,14 @@ class Walker:
         check_inside(start, walk.field)
         self.walk, self.number, self.random = walk, number, random
         self.pose = Pose(start.x, start.y, float(wrap_angle(start.heading)))
-        self.progress = Progress(walk.stopping, walk.route, walk.field, walk.body.step_length)
+        self.stop_check = StopCheck(walk.stopping, walk.route, walk.field, walk.body.step_length)
         self.index, self.ended = 0, False
         self.reset: StopReason | None = None
 
     def measure(self, deviation: float, along: float, route_heading: float) -> None:
         """Take in how far it is from the route (m) and along it (m), and the route's heading there (rad)."""
         self.deviation, self.along, self.route_heading = deviation, along, route_heading
-        self.reason = self.progress.check(self.pose, deviation, along)
+        self.reason = self.stop_check.check(self.pose, deviation, along)
         if self.reason is None and self.index >= self.walk.step_limit:
             self.reason = StopReason.OUT_OF_STEPS
 
@@ -194,15 +194,15 @@ class Walker:
         self.reset = self.reason if put_back else None
         self.ended = step.reason is not None
         if put_back:
-            self.pose = self.progress.put_back()
+            self.pose = self.stop_check.put_back()
         elif not self.ended:
             self.pose = pose.turned(turn).moved(share * body.step_length)
-            self.progress.walked(share)
+            self.stop_check.walked(share)
         self.index += 1
         return step
 
 
-class Progress:
+class StopCheck:
     """How far one agent has come along a route, and whether its walk ends for that.
 
     Attributes:

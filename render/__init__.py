@@ -1,4 +1,4 @@
-"""Panoramas of a world at any pose, by three independent renderers."""
+"""Panoramas of a world at any pose, by a CPU renderer or by OpenGL (EGL or OSMesa)."""
 
 import lazy_loader
 

@@ -23,8 +23,8 @@ class Eye:
         top: Elevation of the upper edge (rad).
         bottom: Elevation of the lower edge (rad).
         z: Height of the eye above z = 0 (m).
-        samples: Rays along each side of a pixel, which is their average over its solid angle. None is 1 where a pixel is at
-            most one degree wide, else 4.
+        samples: n, where n x n rays in each pixel are averaged by solid angle. None means 1 where a pixel is at most one degree
+            wide, else 4.
     """
 
     width: int = whole(720, low=4, high=32768, unit="pixels")

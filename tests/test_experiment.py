@@ -23,13 +23,13 @@ from tussock.navigation.cli.options import RunOptions
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_settings import (
-    OF_PATH,
-    OF_WALK,
+    ROUTE_SETTINGS,
     TYPES,
+    WALK_SETTINGS,
     default_settings,
     experiment_of,
     key_of,
-    path_key,
+    route_key,
     run_command,
     settings_of,
     training_key,
@@ -226,7 +226,7 @@ def test_the_keys_differ_where_a_setting_differs(tmp_path):
     others = {name: experiment_of({name: value}) for name, value in OTHER.items()}
     others["navigator"] = experiment_of({"navigator": f"{__name__}:Ahead"})
     assert len({key_of(base), *map(key_of, others.values())}) == 1 + len(TYPES)
-    for key, names in ((path_key, {*OF_PATH, "seed"}), (training_key, set(TYPES) - set(OF_WALK))):
+    for key, names in ((route_key, {*ROUTE_SETTINGS, "seed"}), (training_key, set(TYPES) - set(WALK_SETTINGS))):
         assert {name for name, other in others.items() if key(other) != key(base)} == names
     # It is the content of a file that counts.
     Path(tmp_path / "route.csv").write_text("x_m,y_m\n0,0\n1,2\n")
@@ -255,7 +255,7 @@ def test_the_keys_are_the_same_for_the_same_run_in_other_words(first, second, tm
     (tmp_path / "route.csv").write_text(ROUTE)
     (tmp_path / "here" / "route.csv").write_text(ROUTE)
     monkeypatch.chdir(tmp_path / "here")
-    for key in (key_of, path_key, training_key):
+    for key in (key_of, route_key, training_key):
         assert key(experiment_of(first)) == key(experiment_of(second))
 
 

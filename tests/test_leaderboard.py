@@ -19,10 +19,10 @@ from tussock.navigation.benchmark.learners import enter_learner, tasks
 from tussock.navigation.benchmark.models import enter, enter_named
 from tussock.navigation.benchmark.results import Line, Result, interval_over_worlds, read_result, score
 from tussock.navigation.cli.benchmark import BenchmarkCommand
-from tussock.navigation.experiment_settings import OF_PATH, TYPES, experiment_of, settings_of
+from tussock.navigation.experiment_settings import ROUTE_SETTINGS, TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.scan import best_turn, scan_window
-from tussock.navigation.sweeps.work import learn, open_path, walk
+from tussock.navigation.sweeps.work import learn, open_world_and_route, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import InputError
 
@@ -101,7 +101,7 @@ def test_the_digest_depends_on_every_setting_of_a_run():
         "scan_deg": 90.0, "scan_about_deg": 10.0, "on_lost": "reset", "waypoint_m": 0.2, "arrive_m": 0.2, "lost_m": 0.6,
         "patience_m": 2.0, "max_steps": 9,
     }  # fmt: skip
-    assert set(changes) == set(TYPES) - set(OF_ENTRY) - set(OF_PATH)
+    assert set(changes) == set(TYPES) - set(OF_ENTRY) - set(ROUTE_SETTINGS)
     base = settings_of(TINY.base)
     digests = {
         dataclasses.replace(TINY, base=experiment_of(base | {name: value})).digest() for name, value in changes.items()
@@ -265,7 +265,7 @@ def test_results_that_do_not_compare_are_refused_before_the_first_run(tmp_path, 
         raise AssertionError("a run has begun")
 
     monkeypatch.setattr("tussock.navigation.benchmark.models.run_sweep", run_none)
-    monkeypatch.setattr("tussock.navigation.benchmark.models.open_path", run_none)
+    monkeypatch.setattr("tussock.navigation.benchmark.models.open_world_and_route", run_none)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "it.json").write_text(made_up("it", line()).to_json())
     refusal = r"it\.json holds a result of made-up-1 .+ this would be one of tussock-1.+; give another --out"
@@ -440,7 +440,7 @@ def test_a_measured_result_is_obtained_again():
     then = measured.runs[1]
     assert (run.world, run.seed, run.body.heading_noise, run.start_offset) == ("tussock-field", 1000, 0.0, 0.0)
     assert then.asked == ("tussock-field", 1000, 0.0, 0.0)
-    trained = learn(run, open_path(run))
+    trained = learn(run, open_world_and_route(run))
     with trained.renderer:
         now = walk(run, trained).results
     assert now["arrived"] == then.arrived

@@ -1,4 +1,4 @@
-"""Errors that a person can cause and mend: each is reported in one line."""
+"""Errors that a person can cause and correct: each is reported in one line."""
 
 
 class InputError(ValueError):

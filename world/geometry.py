@@ -33,7 +33,7 @@ def column_azimuths(width: int) -> Float[np.ndarray, " width"]:
 
 
 def turn_of_columns(columns, width: int):
-    """Turn that rolls a panorama right by a number of columns (rad, left positive, wrapped).
+    """Convert columns to a turn (rad, left positive, wrapped); turning left rolls the panorama right.
 
     Args:
         columns: Number of columns, or an array of numbers.

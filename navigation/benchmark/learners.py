@@ -14,7 +14,7 @@ from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
 from ..rl.environment import RouteFollowing
-from ..sweeps.work import open_path
+from ..sweeps.work import open_world_and_route
 from .definition import BENCHMARK, ENCODING, Benchmark
 from .results import PANORAMA, Line, Result, check_free, line_of, result_of, write_result
 
@@ -116,7 +116,7 @@ def walk(env: RouteFollowing, task: Task, act: Act) -> dict[str, Any]:
 
 def _tasks_of(runs: list[Experiment], *, encoded: bool) -> list[Task]:
     """The tasks of the runs in one world. Those of one noise share their settings."""
-    world, route = open_path(runs[0])
+    world, route = open_world_and_route(runs[0])
     shared: dict[float, dict[str, Any]] = {}
     for run in runs:
         shared.setdefault(

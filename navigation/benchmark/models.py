@@ -12,7 +12,7 @@ from ..models import model_spec
 from ..models.base import FamiliarityModel
 from ..sweeps.store import Store
 from ..sweeps.sweep import run_sweep
-from ..sweeps.work import open_path, walk
+from ..sweeps.work import open_world_and_route, walk
 from .definition import BENCHMARK, ENCODING, Benchmark
 from .results import Result, check_free, line_of, result_of, write_result
 
@@ -104,7 +104,7 @@ def enter(
     chain = benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding):
-        world, route = open_path(runs[0])
+        world, route = open_world_and_route(runs[0])
         with runs[0].open_renderer(world) as renderer:
             trained = runs[0].train(renderer, route, model=make(runs[0].seed))
             learn_seconds.append(trained.seconds)

@@ -25,7 +25,7 @@ PANORAMA = "panorama"  # the encoding of entries that get the view as it is
 TIMES = ("learn_seconds", "walk_seconds")
 RESULTS = "results"  # the folder of the results, next to the runs, which are a sweep's with files of its own
 LIMIT = 2**63  # numbers of a result are smaller
-ASKED = ("world", "seed", "heading_noise_deg", "offset_m")  # of a line: what tells the runs of an entry apart
+RUN_FIELDS = ("world", "seed", "heading_noise_deg", "offset_m")  # of a line: what tells the runs of an entry apart
 
 
 @settings
@@ -62,8 +62,8 @@ class Line:
 
     @property
     def asked(self) -> tuple:
-        """What was asked, in the order of ASKED."""
-        return tuple(getattr(self, name) for name in ASKED)
+        """What was asked, in the order of RUN_FIELDS."""
+        return tuple(getattr(self, name) for name in RUN_FIELDS)
 
 
 @settings
@@ -142,8 +142,8 @@ def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
 def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
     """The line of a run, from its results by name."""
     settings = settings_of(experiment)
-    values: dict[str, Any] = {name: settings[name] for name in ASKED}
-    values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in ASKED}
+    values: dict[str, Any] = {name: settings[name] for name in RUN_FIELDS}
+    values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in RUN_FIELDS}
     values["arrived"] = bool(values["arrived"])
     return Line(**values)
 
@@ -242,7 +242,7 @@ def current_encoding(encoding: str) -> str:
 
 
 def _check_runs(path: Path, result: Result, benchmark: Benchmark) -> None:
-    asked = [tuple(settings_of(run)[name] for name in ASKED) for runs in benchmark.by_world() for run in runs]
+    asked = [tuple(settings_of(run)[name] for name in RUN_FIELDS) for runs in benchmark.by_world() for run in runs]
     if [run.asked for run in result.runs] != asked:
         raise FileError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
 

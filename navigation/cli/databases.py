@@ -11,7 +11,7 @@ import tyro
 from tussock.world.errors import InputError, SettingError
 
 from ..training_setup import ROUTE_SPACING
-from .options import PathOptions, ViewOptions, open_renderer
+from .options import RouteOptions, ViewOptions, open_renderer
 from .terminal import message, progress
 from .worlds import numbers
 
@@ -64,7 +64,7 @@ class DatabaseGridCommand(ViewOptions):
 
 
 @dataclass(kw_only=True)
-class DatabaseRouteCommand(PathOptions):
+class DatabaseRouteCommand(RouteOptions):
     """Draw the views along a route, facing along it, as an image database in the BoB format."""
 
     out: Path

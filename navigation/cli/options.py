@@ -73,7 +73,7 @@ class ViewOptions:
 
 
 @dataclass
-class PathOptions(ViewOptions):
+class RouteOptions(ViewOptions):
     """What world is seen, through what eye, and a route through it."""
 
     route: Path | None = None
@@ -85,7 +85,7 @@ class PathOptions(ViewOptions):
 
 
 @dataclass
-class LearningOptions(PathOptions):
+class LearningOptions(RouteOptions):
     """What is learned along the route."""
 
     encoding: str | None = None

@@ -10,7 +10,7 @@ import tyro
 from tussock.world.errors import SettingError
 
 from ..training_setup import ROUTE_SPACING
-from .options import PathOptions, flags_of
+from .options import RouteOptions, flags_of
 from .terminal import message, progress_of_parts
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class StudyOptions(PathOptions):
+class StudyOptions(RouteOptions):
     """What a study looks at: a world and a route through it, or image databases of both."""
 
     grid_database: Path | None = None
@@ -108,7 +108,7 @@ class StudyOptions(PathOptions):
 
     def settings(self) -> dict[str, Any]:
         """The settings that the flags give, without those of a run. A first look takes half as many columns and rows."""
-        names = [each.name for each in dataclasses.fields(PathOptions)]
+        names = [each.name for each in dataclasses.fields(RouteOptions)]
         size = "360x75" if self.quick and self.size is None else self.size
         return {name: getattr(self, name) for name in names} | {"size": size}
 

@@ -30,7 +30,7 @@ HEADER, VERSION = "tussock", 1
 
 @settings
 class TrainedModel:
-    """A trained model and what it learned from, so that it is not shown other views, and a match is looked up among the right poses.
+    """A trained model with the encoding, eye and poses of its training views. They are compared with those of the views that it is given.
 
     Attributes:
         model: The model.

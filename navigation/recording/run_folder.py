@@ -14,7 +14,7 @@ from tussock.world.errors import FileError, MissingDependencyError
 from tussock.world.progress import Progress, no_progress
 from tussock.world.route_files import write_route
 
-from ..experiment import Experiment, Trained
+from ..experiment import Experiment, TrainedNavigator
 from ..experiment_settings import run_command, settings_of
 from ..reports.maps import write_overview
 from ..trajectory import Trajectory
@@ -30,7 +30,7 @@ RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
 )
 UNFINISHED = "UNFINISHED.txt"  # is there until all the others are
 FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE, UNFINISHED)
-OF_TRAINING = ("every", "learning_walk_m")  # settings that do not apply to a model from a file
+TRAINING_SETTINGS = ("every", "learning_walk_m")  # settings that do not apply to a model from a file
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,12 @@ def record_run(
 
 
 def _record(
-    experiment: Experiment, trained: Trained, out: Path, viewer: str | None, settings: dict[str, Any], walking: Progress
+    experiment: Experiment,
+    trained: TrainedNavigator,
+    out: Path,
+    viewer: str | None,
+    settings: dict[str, Any],
+    walking: Progress,
 ) -> tuple[Trajectory, float]:
     """Walk, and record each step as it is made; returns the trajectory and the seconds."""
     trajectory, began = Trajectory(), time.perf_counter()
@@ -109,11 +114,11 @@ def _record(
     return trajectory, time.perf_counter() - began
 
 
-def _settings(experiment: Experiment, trained: Trained) -> dict[str, Any]:
+def _settings(experiment: Experiment, trained: TrainedNavigator) -> dict[str, Any]:
     """The settings as the summary holds them: with what was chosen automatically."""
     settings = settings_of(experiment)
     if isinstance(experiment.model, Path):
-        settings = {name: value for name, value in settings.items() if name not in OF_TRAINING}
+        settings = {name: value for name, value in settings.items() if name not in TRAINING_SETTINGS}
     n_views = None if trained.poses is None else len(trained.poses)
     return settings | {"encoding": str(experiment.encoding), "renderer": trained.renderer.backend, "n_views": n_views}
 

@@ -63,9 +63,9 @@ class RouteFollowing(gymnasium.Env):
         (observation,), (self._view,) = self._courses.observe([self._episode])
         return observation
 
-    def training_views(self, *, learning_walk: float = 0.2, spacing: float = 0.04):
+    def training_views(self, **setup: float):
         """Observations of the present route and the poses they were made at, to learn it from; see `Courses.training_views`."""
-        return self._courses.training_views(self._episode.seed, learning_walk=learning_walk, spacing=spacing)
+        return self._courses.training_views(self._episode.seed, **setup)
 
     def render(self) -> np.ndarray | None:
         """The present panorama, RGB, enlarged."""
@@ -169,9 +169,9 @@ class RouteFollowingVector(VectorEnv):
             raise SettingError(f"reset_mask {mask}; give {self.num_envs} booleans, at least one of them True")
         return mask
 
-    def training_views(self, k: int = 0, *, learning_walk: float = 0.2, spacing: float = 0.04):
+    def training_views(self, k: int = 0, **setup: float):
         """Observations of the present route of walk `k`, and their poses; see `Courses.training_views`."""
-        return self._courses.training_views(self._episodes[k].seed, learning_walk=learning_walk, spacing=spacing)
+        return self._courses.training_views(self._episodes[k].seed, **setup)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """The present panoramas, RGB, enlarged."""

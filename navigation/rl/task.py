@@ -25,6 +25,7 @@ from ..steering.navigator import Motion
 from ..stopping import StoppingRules, StopReason
 from ..surroundings import Surroundings
 from ..training import training_poses, training_views
+from ..training_setup import TrainingSetup
 from ..walk import Walk, check_inside
 
 SURROUNDINGS, BODY, RULES = Surroundings(), Body(), StoppingRules()  # whose defaults are those of a task
@@ -158,20 +159,23 @@ class Courses:
             views[here] = self[seed].renderer.render([episodes[k].pose for k in here])
         return self.task.encoded(views), views
 
-    def training_views(
-        self, seed: int, *, learning_walk: float = 0.2, spacing: float = 0.04
-    ) -> tuple[Observations, Float[np.ndarray, "n 3"]]:
+    def training_views(self, seed: int, **setup: float) -> tuple[Observations, Float[np.ndarray, "n 3"]]:
         """What a learner is shown of the route of a seed before it walks, and the poses of these views.
 
         Args:
             seed: Of the world.
-            learning_walk: Reach to both sides of the route (m); 0 shows the route only.
-            spacing: Distance between views along the route (m).
+            setup: Fields of a `TrainingSetup`, such as `spacing` (m) or `learning_walk` (m).
 
         Encoded views without contrast are left out (see `tussock.navigation.training.training_views`).
         """
-        course = self[seed]
-        poses = training_poses(course.route, spacing, learning_walk=learning_walk, field=course.renderer.world.field)
+        course, given = self[seed], TrainingSetup(**setup)
+        poses = training_poses(
+            course.route,
+            given.spacing,
+            every=given.every,
+            learning_walk=given.learning_walk,
+            field=course.renderer.world.field,
+        )
         if self.task.chain is None:
             return self.task.encoded(course.renderer.render(poses)), poses
         views, kept = training_views(self.task.chain, course.renderer, poses)

@@ -1,1 +1,1 @@
-"""Many runs: what a sweep file asks for, doing it on as many cores as there are, and what came of it."""
+"""Many runs: what a sweep file asks for, running it on all cores or a cluster, and the results."""

@@ -17,12 +17,12 @@ from tussock.world.errors import FileError, InputError, MissingDependencyError
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
-from ..experiment_settings import TYPES, key_of, path_key, run_command, settings_of, training_key
+from ..experiment_settings import TYPES, key_of, route_key, run_command, settings_of, training_key
 from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
 from .store import Finished, Store, table_of, write_table
-from .work import Walked, learn, open_path, walk
+from .work import Walked, learn, open_world_and_route, walk
 
 log = logging.getLogger(__name__)
 
@@ -120,7 +120,7 @@ def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[t
     """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
     futures = {}
     for key, experiment in missing.items():
-        path = client.submit(open_path, experiment, key=path_key(experiment))
+        path = client.submit(open_world_and_route, experiment, key=route_key(experiment))
         trained = client.submit(learn, experiment, path, key=training_key(experiment))
         futures[client.submit(walk, experiment, trained, key=f"run-{key}")] = key
     path = trained = None  # so that workers forget worlds and models when the last run that needs them is done

@@ -9,7 +9,7 @@ from tussock.world.errors import InputError
 from tussock.world.geometry import Route
 from tussock.world.scene import World
 
-from ..experiment import Experiment, Trained
+from ..experiment import Experiment, TrainedNavigator
 from ..failures import Cause
 from ..models.base import memory_bytes
 from ..trajectory import Trajectory
@@ -39,19 +39,19 @@ def dask_setup(worker: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def open_path(experiment: Experiment) -> tuple[World, Route]:
+def open_world_and_route(experiment: Experiment) -> tuple[World, Route]:
     """The world of an experiment, and the route through it."""
     world = experiment.open_world()
     return world, experiment.open_route(world)
 
 
-def learn(experiment: Experiment, path: tuple[World, Route]) -> Trained:
+def learn(experiment: Experiment, path: tuple[World, Route]) -> TrainedNavigator:
     """What the navigator of an experiment learns before the walk."""
     world, route = path
     return experiment.train(experiment.open_renderer(world), route)
 
 
-def walk(experiment: Experiment, trained: Trained) -> Walked:
+def walk(experiment: Experiment, trained: TrainedNavigator) -> Walked:
     """Walk as an experiment says."""
     began, trajectory = time.perf_counter(), Trajectory()
     try:
