@@ -63,7 +63,7 @@ class RouteFollowing(gymnasium.Env):
         (observation,), (self._view,) = self._courses.observe([self._episode])
         return observation
 
-    def training_views(self, **setup: float):
+    def training_views(self, **setup: Any):
         """Observations of the present route and the poses they were made at, to learn it from; see `Courses.training_views`."""
         return self._courses.training_views(self._episode.seed, **setup)
 
@@ -169,7 +169,7 @@ class RouteFollowingVector(VectorEnv):
             raise SettingError(f"reset_mask {mask}; give {self.num_envs} booleans, at least one of them True")
         return mask
 
-    def training_views(self, k: int = 0, **setup: float):
+    def training_views(self, k: int = 0, **setup: Any):
         """Observations of the present route of walk `k`, and their poses; see `Courses.training_views`."""
         return self._courses.training_views(self._episodes[k].seed, **setup)
 

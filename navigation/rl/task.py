@@ -159,7 +159,7 @@ class Courses:
             views[here] = self[seed].renderer.render([episodes[k].pose for k in here])
         return self.task.encoded(views), views
 
-    def training_views(self, seed: int, **setup: float) -> tuple[Observations, Float[np.ndarray, "n 3"]]:
+    def training_views(self, seed: int, **setup: Any) -> tuple[Observations, Float[np.ndarray, "n 3"]]:
         """What a learner is shown of the route of a seed before it walks, and the poses of these views.
 
         Args:
