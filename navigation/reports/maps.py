@@ -128,9 +128,7 @@ def draw_arrows(axes: Axes, x, y, heading_deg, colour, length=ARROW, **style) ->
 
 def _draw_world(axes: Axes, world: World) -> None:
     triangles, rgb = world.surfaces()
-    order = (
-        triangles[..., 2].max(axis=1).argsort(kind="stable")
-    )  # lower triangles first, so that higher ones cover them
+    order = triangles[..., 2].max(axis=1).argsort(kind="stable")  # lower ones first, so that higher ones cover them
     surfaces = PolyCollection(
         list(triangles[order, :, :2]),
         facecolors=rgb[order] / 255,

@@ -13,7 +13,7 @@ from distributed import CancelledError, Client, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
-from tussock.world.errors import FileError, InputError, MissingDependencyError
+from tussock.world.errors import FileError, InputError, MissingDependencyError, first_line
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
@@ -109,10 +109,9 @@ def _run(
             progress(done)
     if unfinished:
         key, error = unfinished[0]
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
             f"{len(unfinished)} of {len(missing)} runs could not be finished; all others are kept, and the same command tries again. "
-            f"The first, {run_command(missing[key], f'run-{key}')}: {first}"
+            f"The first, {run_command(missing[key], f'run-{key}')}: {first_line(error)}"
         )
 
 

@@ -21,9 +21,7 @@ from tussock.world.scene import World
 from ...evaluation import nearest_view
 
 MAX_DISTANCE = 0.5  # m; grid positions farther from the route are not used
-NEAR = (
-    0.2  # m; headings are recovered at grid positions within this distance of the route (section 4.3.1 of the thesis)
-)
+NEAR = 0.2  # m; headings are recovered at grid positions within this distance of the route (4.3.1)
 MIN_ROUTE_VIEWS, MIN_POSITIONS = 48, 8  # with fewer, the numbers have no meaning
 GRID_SPACING = 0.2  # m (4.1)
 
