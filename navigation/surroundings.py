@@ -104,6 +104,11 @@ class Surroundings:
         check_route(world, route)
         return route
 
+    def open_world_and_route(self) -> "tuple[World, Route]":
+        """The world, and the route through it."""
+        world = self.open_world()
+        return world, self.open_route(world)
+
     def open_renderer(self, world: "World") -> "Renderer":
         """A renderer of the world for the eye; use it in a `with` statement."""
         from tussock.render.renderer import open_renderer

@@ -93,13 +93,9 @@ def training_views(
 
 
 def train(
-    model: FamiliarityModel,
-    encoding: Encoding,
-    renderer: Renderer,
-    poses: Float[np.ndarray, "n 3"],
-    progress: Progress = no_progress,
+    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"]
 ) -> TrainedModel:
     """Train a model on the views at poses (see `training_views`)."""
-    views, kept = training_views(encoding, renderer, poses, progress)
+    views, kept = training_views(encoding, renderer, poses)
     model.fit(views)
     return TrainedModel(model=model, encoding=encoding, eye=renderer.eye, poses=kept)

@@ -36,22 +36,9 @@ class Trajectory:
     def add(self, step: Step, diagnosis: Diagnosis | None = None) -> None:
         """Append a step, and what `Diagnostics` measured there."""
         scanned = None if step.familiarity is None else float(step.familiarity[step.scanned].max())
-        row = (
-            step.index,
-            step.pose.x,
-            step.pose.y,
-            float(np.degrees(step.pose.heading)),
-            float(np.degrees(step.turn)),
-            scanned,
-            step.deviation,
-            step.along,
-            float(np.degrees(step.error)),
-            step.match,
-            step.progress,
-            step.reset,
-            step.reason,
-            *_measured(diagnosis),
-        )
+        heading, turn, error = (float(np.degrees(angle)) for angle in (step.pose.heading, step.turn, step.error))
+        row = (step.index, *step.pose[:2], heading, turn, scanned, step.deviation, step.along, error)
+        row += (step.match, step.progress, step.reset, step.reason, *_measured(diagnosis))
         self.rows.append(tuple(map(_plain, row)))
 
     def __len__(self) -> int:

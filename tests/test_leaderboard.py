@@ -22,7 +22,7 @@ from tussock.navigation.cli.benchmark import BenchmarkCommand
 from tussock.navigation.experiment_settings import ROUTE_SETTINGS, TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.scan import best_turn, scan_window
-from tussock.navigation.sweeps.work import learn, open_world_and_route, walk
+from tussock.navigation.sweeps.work import learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import InputError
 
@@ -43,7 +43,7 @@ DIGESTS = {
 @pytest.fixture(scope="module")
 def entered(tmp_path_factory, cluster) -> tuple[Result, Path]:
     """Perfect memory, as the command enters it."""
-    return enter_named("perfect-memory", tmp_path_factory.mktemp("entered"), benchmark=TINY, scheduler=cluster)
+    return enter_named("perfect-memory", tmp_path_factory.mktemp("entered"), benchmark=TINY, workers=cluster)
 
 
 def line(
@@ -219,7 +219,7 @@ def test_a_learner_may_see_the_panorama(tmp_path):
 
 
 def test_runs_that_cannot_be_done_have_not_arrived(tmp_path, cluster):
-    result, _ = enter_named("infomax rate=1e6", tmp_path, benchmark=TINY, scheduler=cluster)
+    result, _ = enter_named("infomax rate=1e6", tmp_path, benchmark=TINY, workers=cluster)
     totals = result.scores()["totals"]
     assert (totals["arrived"], totals["could_not_run"], totals["mean_deviation_m"]) == (0, 4, None)
     assert "rate" in (result.runs[0].error or "")
@@ -265,7 +265,7 @@ def test_results_that_do_not_compare_are_refused_before_the_first_run(tmp_path, 
         raise AssertionError("a run has begun")
 
     monkeypatch.setattr("tussock.navigation.benchmark.models.run_sweep", run_none)
-    monkeypatch.setattr("tussock.navigation.benchmark.models.open_world_and_route", run_none)
+    monkeypatch.setattr("tussock.navigation.experiment.Experiment.open_world_and_route", run_none)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "it.json").write_text(made_up("it", line()).to_json())
     refusal = r"it\.json holds a result of made-up-1 .+ this would be one of tussock-1.+; give another --out"
@@ -440,7 +440,7 @@ def test_a_measured_result_is_obtained_again():
     then = measured.runs[1]
     assert (run.world, run.seed, run.body.heading_noise, run.start_offset) == ("tussock-field", 1000, 0.0, 0.0)
     assert then.asked == ("tussock-field", 1000, 0.0, 0.0)
-    trained = learn(run, open_world_and_route(run))
+    trained = learn(run, run.open_world_and_route())
     with trained.renderer:
         now = walk(run, trained).results
     assert now["arrived"] == then.arrived

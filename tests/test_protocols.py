@@ -31,7 +31,7 @@ from tussock.navigation.studies.protocols import (
 )
 from tussock.navigation.studies.protocols.azevedo2025 import of_walk
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
-from tussock.navigation.sweeps.work import learn, open_world_and_route, walk
+from tussock.navigation.sweeps.work import learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
 from tussock.world.files import write_world
@@ -216,7 +216,7 @@ def test_a_route_has_the_length_that_it_has(tmp_path):
         run = Experiment(
             world=world, eye=Eye(width=36, height=8), route_length=20.0, seed=1, stopping=StoppingRules(max_steps=1)
         )
-        path = open_world_and_route(run)
+        path = run.open_world_and_route()
         assert path[1].length < 5
         assert walk(run, learn(run, path)).results["route_m"] == path[1].length
 

@@ -30,7 +30,7 @@ from tussock.world.settings import (
 
 @settings
 class Body:
-    step: float = number(0.05, above=0, below=2, unit="m")
+    step: float = number(0.05, above=0, high=2, unit="m")
     turn: float | None = number(1.0, low=-math.pi, high=math.pi, unit="rad", optional=True)
     rate: float | str = number("slow", low=0, names=("slow", "fast"))
     legs: int = whole(6, low=2, high=100, unit="legs")
@@ -44,7 +44,7 @@ class Body:
 
 
 ACCEPTED = {
-    "step": (1e-300, 1, 1.999, np.float32(0.5), np.int64(1), Fraction(1, 4)),
+    "step": (1e-300, 1, 2, np.float32(0.5), np.int64(1), Fraction(1, 4)),
     "turn": (None, -math.pi, 3),
     "rate": ("fast", 0, 1e300),
     "legs": (2, 100, np.int64(8)),
@@ -57,7 +57,7 @@ ACCEPTED = {
     "parent": ({},),
 }
 REFUSED = {
-    "step": (0, 2, -1, math.nan, math.inf, 10**400, "1", True, None, np.array([0.5]), 1j),
+    "step": (0, 2.001, -1, math.nan, math.inf, 10**400, "1", True, None, np.array([0.5]), 1j),
     "turn": (3.2, "left", False),
     "rate": (-1, "medium", math.inf, None),
     "legs": (1, 101, 2.0, True, 10**400, "6", None),
@@ -101,7 +101,7 @@ def test_an_invalid_value_is_refused_with_its_name_and_the_value(name, value):
 @pytest.mark.parametrize(
     ("name", "value", "parts"),
     [
-        ("step", 2.5, ("2.5", "a number", "over 0", "under 2", "(m)")),
+        ("step", 2.5, ("2.5", "a number", "over 0", "to 2", "(m)")),
         ("turn", -7.0, ("-7 rad", "-401.07 degrees", "None")),
         ("rate", "medium", ("'medium'", "from 0", "slow, fast")),
         ("legs", 1, ("a whole number", "from 2", "to 100", "(legs)")),
@@ -123,10 +123,10 @@ def test_any_value_is_kept_within_the_range_or_refused(value):
     try:
         step = Body(step=value).step
     except SettingError:
-        assert not (isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 2)
+        assert not (isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= 2)
     else:
         assert step == value
-        assert 0 < step < 2
+        assert 0 < step <= 2
 
 
 def test_settings_are_frozen_and_a_changed_copy_is_checked():

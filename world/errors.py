@@ -22,3 +22,8 @@ class DiskFullError(FileError):
 
 class MissingDependencyError(InputError):
     """A driver, library, program or display that is missing on this machine."""
+
+
+def first_line(error: BaseException) -> str:
+    """The message of an error of another library, without the lines that only programmers read."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]

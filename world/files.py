@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from .atomic import replacing
-from .errors import FileError, InputError
+from .errors import FileError, InputError, first_line
 from .geometry import Bounds
 from .mesh_materials import face_rgb, texture_of
 from .params import WORLDS, check_preset, is_generated
-from .route_files import existing_file, first_line, naming, read_planes
+from .route_files import existing_file, naming, read_planes
 from .scene import Ground, World
 from .settings import MAX_COORDINATE
 
@@ -88,7 +88,7 @@ def _read_mesh(path: Path) -> World:
     except InputError:
         raise
     except Exception as error:  # the readers of meshes and of their textures raise errors of any class
-        raise FileError(f"{path} cannot be read as a mesh ({first_line(error)}); is it complete?") from error
+        raise FileError(f"{path} cannot be read as a mesh ({first_line(error)[:160]}); is it complete?") from error
     if len(triangles) == 0:
         raise FileError(f"{path} holds no triangles; a world needs some")
     if metadata is None:
@@ -98,7 +98,9 @@ def _read_mesh(path: Path) -> World:
     try:
         return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(metadata))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise FileError(f"its {KEY} metadata cannot be used ({first_line(error)}); write the world again") from error
+        raise FileError(
+            f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
+        ) from error
 
 
 def _check_accessors(path: Path) -> None:

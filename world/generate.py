@@ -31,7 +31,7 @@ def generate_plants(params: WorldParams, seed: int) -> Plant:
 
     Raises SettingError for a seed that is not a whole number from 0.
     """
-    layout, streams = _layout(params, seed)
+    layout, streams = plant_layout(params, seed)
     field = params.field
     triangles, rgb = [np.zeros((0, 3, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
     for kind, rows in layout.items():
@@ -46,11 +46,6 @@ def generate_plants(params: WorldParams, seed: int) -> Plant:
     return np.concatenate(triangles), np.concatenate(rgb)
 
 
-def plant_positions(params: WorldParams, seed: int) -> dict[str, Float[np.ndarray, "n 2"]]:
-    """Position of every plant, stone and tree of the world of a seed (m), by kind."""
-    return {kind: rows[:, :2] for kind, rows in _layout(params, seed)[0].items()}
-
-
 def seeded(seed: int) -> np.random.Generator:
     """The generator of a seed. Raises SettingError for a seed that is not a whole number from 0."""
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
@@ -58,8 +53,8 @@ def seeded(seed: int) -> np.random.Generator:
     return np.random.default_rng(int(seed))
 
 
-def _layout(params: WorldParams, seed: int) -> tuple[Layout, Streams]:
-    """Positions of all kinds, and the generator for the shapes of each kind."""
+def plant_layout(params: WorldParams, seed: int) -> tuple[Layout, Streams]:
+    """Where every plant, stone and tree of a world is, by kind, and the generator for the shapes of each kind."""
     streams: Streams = dict(zip(STREAMS, seeded(seed).spawn(len(STREAMS)), strict=True))
     p, land = params, streams["land"]
     fertility, tone = _random_field(p.patch_size, land), _random_field(2 * p.patch_size, land)

@@ -130,18 +130,8 @@ class WorldParams:
         """The field (m)."""
         return Bounds(0.0, 0.0, self.field_width, self.field_depth)
 
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "WorldParams":
-        """Parameters from plain JSON types, as in `World.origin["params"]`; missing ones take their defaults."""
-        if not isinstance(values, dict):
-            raise SettingError(f"parameters of a world are names and values, got {values!r}")
-        names = [each.name for each in attrs.fields(cls)]
-        if unknown := [str(name) for name in values if name not in names]:
-            raise SettingError(f"a world has no parameter {unknown[0]!r}; its parameters are {', '.join(names)}")
-        return cls(**values)
-
     def to_dict(self) -> dict[str, Any]:
-        """The parameters as plain JSON types."""
+        """The parameters as plain JSON types, as in `World.origin["params"]`; `WorldParams(**values)` is the inverse."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in attrs.asdict(self).items()}
 
 
@@ -167,14 +157,8 @@ TINY = partial(  # fewer than 200 triangles for any seed
 )  # fmt: skip
 
 # A preset returns WorldParams, or takes a seed and returns a World.
-WORLDS = Registry(
-    "worlds", "world", {
-        "tussock-field": "tussock.world.params:WorldParams",
-        "meadow": "tussock.world.params:MEADOW",
-        "scrub": "tussock.world.params:SCRUB",
-        "tiny": "tussock.world.params:TINY",
-    },
-)  # fmt: skip
+PRESETS = {"tussock-field": "WorldParams", "meadow": "MEADOW", "scrub": "SCRUB", "tiny": "TINY"}
+WORLDS = Registry("worlds", "world", {name: f"{__name__}:{where}" for name, where in PRESETS.items()})
 
 
 def is_generated(text: str) -> bool:

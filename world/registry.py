@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -78,10 +78,15 @@ class Registry:
             return None
         return self._installed[name].value if name in self._installed else name
 
-    def spec(self, text: str) -> Spec:
-        """The spec that a text holds. Raises SettingError for an unknown name or parameter."""
+    def spec(self, text: str, find: Callable[[str], Callable[..., Any]] | None = None) -> Spec:
+        """The spec that a text holds. Raises SettingError for an unknown name or parameter.
+
+        Args:
+            text: A name, after which parameters may follow.
+            find: Gives the class or function of a name; None means those of this registry.
+        """
         try:
-            return parse_spec(text, self.find)
+            return parse_spec(text, find or self.find)
         except SettingError as error:
             raise error if repr(text) in str(error) else SettingError(f"{self.kind} {text!r}: {error}") from error
 

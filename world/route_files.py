@@ -60,11 +60,6 @@ def naming(path: Path, error: InputError) -> InputError:
     return error if message.startswith(str(path)) else FileError(f"{path}: {message}")
 
 
-def first_line(error: Exception) -> str:
-    """The message of an error of another library, in one line."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:160]
-
-
 def read_planes(path: Path, planes: int, what: str) -> Float[np.ndarray, "planes n"]:
     """The arrays of little-endian float64 that an AntWorld file consists of, one after the other.
 

@@ -50,7 +50,6 @@ def number(
     low: float = -math.inf,
     high: float = math.inf,
     above: float = -math.inf,
-    below: float = math.inf,
     unit: str = "",
     optional: bool = False,
     names: Collection[str] = (),
@@ -62,12 +61,11 @@ def number(
         low: Minimum, allowed itself.
         high: Maximum, allowed itself.
         above: Lower limit, not allowed itself.
-        below: Upper limit, not allowed itself.
         unit: Unit of the number. Errors report "rad" in degrees as well.
         optional: Whether None is allowed.
         names: Texts that are allowed in place of a number.
     """
-    return _single(default, _Range(float, low, high, above, below, unit), optional, names)
+    return _single(default, _Range(float, low, high, above, unit), optional, names)
 
 
 def whole(
@@ -77,31 +75,19 @@ def whole(
     return _single(default, _Range(int, low, high, unit=unit), optional, ())
 
 
-def numbers(
-    default: tuple[float, ...], *, low: float = -math.inf, high: float = math.inf, unit: str = "", single: bool = False
-) -> Any:
-    """A field for a tuple of at least one number.
-
-    Args:
-        default: Value of the field.
-        low: Minimum of each number.
-        high: Maximum of each number.
-        unit: Unit of the numbers.
-        single: Whether a number alone is allowed as well.
-    """
-    return _several(default, _Range(float, low, high, unit=unit), single)
+def numbers(default: tuple[float, ...], *, low: float = -math.inf, high: float = math.inf, unit: str = "") -> Any:
+    """A field for a tuple of at least one number from `low` to `high`. For the other arguments see `number`."""
+    return _several(default, _Range(float, low, high, unit=unit))
 
 
-def wholes(
-    default: tuple[int, ...], *, low: float = 1, high: float = MAX_WHOLE, unit: str = "", single: bool = False
-) -> Any:
-    """A field for a tuple of at least one whole number. For the arguments see `numbers`."""
-    return _several(default, _Range(int, low, high, unit=unit), single)
+def wholes(default: tuple[int, ...], *, single: bool = False) -> Any:
+    """A field for a tuple of at least one whole number from 1. single: Whether a number alone is allowed as well."""
+    return _several(default, _Range(int, 1, MAX_WHOLE), single)
 
 
 def colour(default: RGB) -> Any:
     """A field for a colour: red, green and blue, each a whole number from 0 to 255."""
-    return _several(default, _Range(int, 0, 255), False, count=3)
+    return _several(default, _Range(int, 0, 255), count=3)
 
 
 def choice(default: str, names: Iterable[str]) -> Any:
@@ -130,21 +116,20 @@ def switch(default: bool) -> Any:
     return instance_of(bool, default, "True or False")
 
 
-def instance_of(kinds: Any, default: Any, wanted: str, *, converter: Callable[[Any], Any] | None = None) -> Any:
+def instance_of(kinds: Any, default: Any, wanted: str) -> Any:
     """A field for an object of a class.
 
     Args:
         kinds: The class, or several, as for isinstance.
         default: Value of the field.
         wanted: What to give, for the error.
-        converter: Applied to a value before it is checked.
     """
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
         if not isinstance(value, kinds):
             refuse(instance, attribute, value, wanted)
 
-    return attrs.field(default=default, validator=check, converter=converter)
+    return attrs.field(default=default, validator=check)
 
 
 def describe(cls: type) -> dict[str, dict[str, Any]]:
@@ -174,13 +159,12 @@ def shown(value: Any, metadata: Mapping[str, Any]) -> str:
 
 @attrs.frozen
 class _Range:
-    """Numbers of one kind (int or float) between limits, of which `above` and `below` are not allowed themselves."""
+    """Numbers of one kind (int or float) between limits, of which `above` is not allowed itself."""
 
     kind: type
     low: float
     high: float
     above: float = -math.inf
-    below: float = math.inf
     unit: str = ""
 
     def convert(self, value: Any) -> Any:
@@ -195,19 +179,19 @@ class _Range:
     def __contains__(self, value: Any) -> bool:
         if isinstance(value, bool) or not isinstance(value, self.kind):
             return False
-        return self.low <= value <= self.high and self.above < value < self.below  # never nan or infinite
+        return self.low <= value <= self.high and self.above < value < math.inf  # never nan or infinite
 
     def __str__(self) -> str:
         low = f"over {self.above:g}" if self.above > -math.inf else f"from {self.low:g}" if self.low > -math.inf else ""
         largest = MAX_WHOLE if self.kind is int else math.inf
-        high = f"under {self.below:g}" if self.below < math.inf else f"to {self.high:g}" if self.high < largest else ""
+        high = f"to {self.high:g}" if self.high < largest else ""
         words = ["whole number" if self.kind is int else "number", low, high, f"({self.unit})" if self.unit else ""]
         return " ".join(filter(None, words))
 
     @property
     def metadata(self) -> dict[str, Any]:
         """Unit and limits, for `describe`."""
-        return {"unit": self.unit, "low": max(self.low, self.above), "high": min(self.high, self.below)}
+        return {"unit": self.unit, "low": max(self.low, self.above), "high": self.high}
 
 
 def _single(default: Any, allowed: _Range, optional: bool, names: Collection[str]) -> Any:
@@ -221,7 +205,7 @@ def _single(default: Any, allowed: _Range, optional: bool, names: Collection[str
     return attrs.field(default=default, converter=allowed.convert, validator=check, metadata=allowed.metadata)
 
 
-def _several(default: tuple, allowed: _Range, single: bool, count: int | None = None) -> Any:
+def _several(default: tuple, allowed: _Range, single: bool = False, count: int | None = None) -> Any:
     """A field for a tuple of numbers: `count` of them, or at least one."""
     wanted = f"{count} {str(allowed).replace('number', 'numbers')}" if count else f"at least one {allowed}"
 

@@ -101,7 +101,7 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
     Args:
         words: Parameters as `name=value`; an angle may be given in degrees, as `name_deg=value`.
         name: Name of the target, for messages.
-        target: Class or function whose parameters they are.
+        target: Class or function whose parameters they are. It may list former names of these in `renamed`.
 
     Raises:
         SettingError: For a parameter that the target does not have, and for one that is given twice.
@@ -112,6 +112,7 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
         key, _, value = word.partition("=")
         if not (key and value):
             raise SettingError(f"{word!r} is not a parameter; give name=value, without spaces")
+        key = getattr(target, "renamed", {}).get(key, key)
         in_degrees = not _takes(target, key) and key.removesuffix("_deg") in own
         key = key.removesuffix("_deg") if in_degrees else key
         if key in RESERVED:

@@ -14,9 +14,8 @@ from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
 from ..rl.environment import RouteFollowing
-from ..sweeps.work import open_world_and_route
 from .definition import BENCHMARK, ENCODING, Benchmark
-from .results import PANORAMA, Line, Result, check_free, line_of, result_of, write_result
+from .results import PANORAMA, Result, check_free, result_of, write_result
 
 Act = Callable[[np.ndarray, int], np.ndarray]  # observation, number of the look from 0 on -> action
 
@@ -73,12 +72,13 @@ def enter_learner(
     Raises:
         InputError: As `enter_named` does.
     """
-    lines: list[Line] = []
-    learn_seconds, walk_seconds = [], []
+    done: list[Experiment] = []
+    results: list[dict[str, Any]] = []
     chain = PANORAMA if encoding is None else benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding or ENCODING):
         act: Act | None = None
+        learned = 0.0
         for _, group in groupby(_tasks_of(runs, encoded=encoding is not None), key=lambda task: id(task.settings)):
             here = list(group)
             with closing(RouteFollowing(**here[0].settings)) as env:
@@ -86,15 +86,14 @@ def enter_learner(
                     env.reset(**here[0].reset)
                     began = time.perf_counter()
                     act = learn(env)
-                    learn_seconds.append(time.perf_counter() - began)
+                    learned = time.perf_counter() - began
                 for task in here:
                     began = time.perf_counter()
-                    lines.append(line_of(task.run, walk(env, task, act)))
-                    walk_seconds.append(time.perf_counter() - began)
-                    progress(len(lines), len(benchmark))
-    result = result_of(
-        benchmark, name, chain, lines, memory_bytes=[], learn_seconds=learn_seconds, walk_seconds=walk_seconds
-    )
+                    walked = walk(env, task, act)
+                    results.append(walked | {"seconds": time.perf_counter() - began, "learn_seconds": learned})
+                    done.append(task.run)
+                    progress(len(done), len(benchmark))
+    result = result_of(benchmark, name, chain, done, results)
     return result, write_result(result, out, benchmark)
 
 
@@ -116,7 +115,7 @@ def walk(env: RouteFollowing, task: Task, act: Act) -> dict[str, Any]:
 
 def _tasks_of(runs: list[Experiment], *, encoded: bool) -> list[Task]:
     """The tasks of the runs in one world. Those of one noise share their settings."""
-    world, route = open_world_and_route(runs[0])
+    world, route = runs[0].open_world_and_route()
     shared: dict[float, dict[str, Any]] = {}
     for run in runs:
         shared.setdefault(

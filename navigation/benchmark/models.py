@@ -2,19 +2,20 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 
-from ..experiment import MODEL_SUFFIX
+from ..experiment import MODEL_SUFFIX, Experiment
 from ..experiment_settings import key_of
 from ..models import model_spec
 from ..models.base import FamiliarityModel
 from ..sweeps.store import Store
 from ..sweeps.sweep import run_sweep
-from ..sweeps.work import open_world_and_route, walk
+from ..sweeps.work import walk
 from .definition import BENCHMARK, ENCODING, Benchmark
-from .results import Result, check_free, line_of, result_of, write_result
+from .results import Result, check_free, result_of, write_result
 
 
 def enter_named(
@@ -23,8 +24,7 @@ def enter_named(
     *,
     encoding: str = ENCODING,
     benchmark: Benchmark = BENCHMARK,
-    scheduler: str | None = None,
-    workers: int | None = None,
+    workers: str | int | None = None,
     progress: Progress = no_progress,
 ) -> tuple[Result, Path]:
     """Enter a model by its spec.
@@ -34,7 +34,6 @@ def enter_named(
         out: Folder for the runs, which are kept as a sweep keeps them, and for the result, in `out`/results.
         encoding: What the model gets of a view.
         benchmark: What is asked.
-        scheduler: See `run_sweep`.
         workers: See `run_sweep`.
         progress: Called with how many runs are finished, of how many.
 
@@ -47,20 +46,11 @@ def enter_named(
     entry = checked_entry(name)
     sweep, chain = benchmark.sweep(entry, encoding), benchmark.chain(encoding)
     check_free(out, benchmark, entry, chain)
-    run_sweep(sweep, out, scheduler=scheduler, workers=workers, progress=progress)
+    run_sweep(sweep, out, workers=workers, progress=progress)
     with Store(out, read_only=True) as store:
         kept = store.rows()
     rows = [kept[key_of(run)] for run in sweep.experiments]
-    done = [row for row in rows if row["error"] is None]
-    result = result_of(
-        benchmark,
-        entry,
-        chain,
-        [line_of(run, row) for run, row in zip(sweep.experiments, rows, strict=True)],
-        memory_bytes=[row["memory_bytes"] for row in done],
-        learn_seconds=[row["learn_seconds"] for row in done],
-        walk_seconds=[row["seconds"] for row in done],
-    )
+    result = result_of(benchmark, entry, chain, sweep.experiments, rows)
     return result, write_result(result, out, benchmark)
 
 
@@ -100,21 +90,19 @@ def enter(
     Raises:
         InputError: As `enter_named` does.
     """
-    lines, sizes, learn_seconds, walk_seconds = [], [], [], []
+    done: list[Experiment] = []
+    results: list[dict[str, Any]] = []
     chain = benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding):
-        world, route = open_world_and_route(runs[0])
+        world, route = runs[0].open_world_and_route()
         with runs[0].open_renderer(world) as renderer:
             trained = runs[0].train(renderer, route, model=make(runs[0].seed))
-            learn_seconds.append(trained.seconds)
             for run in runs:
                 walked = walk(run, trained)
-                lines.append(line_of(run, walked.results))
-                sizes.append(walked.results["memory_bytes"])
-                walk_seconds.append(walked.seconds)
-                progress(len(lines), len(benchmark))
-    result = result_of(
-        benchmark, name, chain, lines, memory_bytes=sizes, learn_seconds=learn_seconds, walk_seconds=walk_seconds
-    )
+                times = {"seconds": walked.seconds, "learn_seconds": walked.learn_seconds}
+                results.append(walked.results | times | {"error": walked.refused})
+                done.append(run)
+                progress(len(done), len(benchmark))
+    result = result_of(benchmark, name, chain, done, results)
     return result, write_result(result, out, benchmark)

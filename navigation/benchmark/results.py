@@ -22,7 +22,10 @@ from ..sweeps.statistics import mean_interval
 from .definition import BENCHMARKS, Benchmark
 
 PANORAMA = "panorama"  # the encoding of entries that get the view as it is
-TIMES = ("learn_seconds", "walk_seconds")
+TIMES = {
+    "learn_seconds": "learn_seconds",
+    "walk_seconds": "seconds",
+}  # of a result, and of a run in the table of a sweep
 RESULTS = "results"  # the folder of the results, next to the runs, which are a sweep's with files of its own
 LIMIT = 2**63  # numbers of a result are smaller
 RUN_FIELDS = ("world", "seed", "heading_noise_deg", "offset_m")  # of a line: what tells the runs of an entry apart
@@ -152,23 +155,20 @@ def result_of(
     benchmark: Benchmark,
     entry: str,
     encoding: str,
-    runs: Sequence[Line],
-    *,
-    memory_bytes: Sequence[int | None],
-    learn_seconds: Sequence[float],
-    walk_seconds: Sequence[float],
+    runs: Sequence[Experiment],
+    results: Sequence[Mapping[str, Any]],
 ) -> Result:
-    """The result of an entry, from its runs."""
-    known = [size for size in memory_bytes if size is not None]
-    times = zip(TIMES, (learn_seconds, walk_seconds), strict=True)
+    """The result of an entry, from its runs and the results of each by the names of a sweep's table."""
+    done = [each for each in results if each.get("error") is None]
+    sizes = [each["memory_bytes"] for each in done if each.get("memory_bytes") is not None]
     return Result(
         benchmark=benchmark.name,
         entry=entry,
         encoding=encoding,
         tussock=version("tussock"),
-        runs=runs,
-        memory_bytes=max(known, default=None),
-        times={name: float(np.mean(seconds)) for name, seconds in times if len(seconds)},
+        runs=list(map(line_of, runs, results)),
+        memory_bytes=max(sizes, default=None),
+        times={name: float(np.mean([each[column] for each in done])) for name, column in TIMES.items() if done},
     )
 
 
@@ -242,7 +242,7 @@ def current_encoding(encoding: str) -> str:
 
 
 def _check_runs(path: Path, result: Result, benchmark: Benchmark) -> None:
-    asked = [tuple(settings_of(run)[name] for name in RUN_FIELDS) for runs in benchmark.by_world() for run in runs]
+    asked = benchmark.asked()
     if [run.asked for run in result.runs] != asked:
         raise FileError(f"{path}: its runs are not the {len(asked)} of {benchmark.name}; make it again")
 

@@ -2,18 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
-
-import tyro
+from typing import Any
 
 from tussock.world.errors import SettingError
 
-from .sweeps import check_workers
+from .options import WorkerOptions
 from .terminal import message, progress
 
 
 @dataclass
-class BenchmarkCommand:
+class BenchmarkCommand(WorkerOptions):
     """Enter models in the test bed: fixed worlds, routes, starts and noise, a result a model, and a leaderboard."""
 
     model: str | None = None
@@ -26,12 +24,6 @@ class BenchmarkCommand:
     """A first look: other, fewer runs, whose results compare with no others."""
     leaderboard: Path | None = None
     """Only print the table of the results in this folder, an --out or one of results alone."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this command alone."""
-    workers: int | None = None
-    """How many of these. Default: one a core."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..benchmark.leaderboard import leaderboard, read_results
@@ -40,7 +32,7 @@ class BenchmarkCommand:
             raise SettingError(
                 "give --model NAME to enter a model, or --leaderboard DIR to see the results in a folder"
             )
-        check_workers(self.scheduler, self.workers)
+        self.chosen_workers()  # refuses contradicting flags
         if self.leaderboard is not None:
             return {"table": leaderboard(read_results(self.leaderboard))}
         files = [str(path) for path in self._enter()]
@@ -61,9 +53,13 @@ class BenchmarkCommand:
             message(f"{name}: {len(benchmark)} runs of {benchmark.name}")
             with progress("walking", "runs", verbose=True) as report:
                 result, path = enter_named(
-                    name, self.out, encoding=self.encoding, benchmark=benchmark, scheduler=self.scheduler,
-                    workers=self.workers, progress=report,
-                )  # fmt: skip
+                    name,
+                    self.out,
+                    encoding=self.encoding,
+                    benchmark=benchmark,
+                    workers=self.chosen_workers(),
+                    progress=report,
+                )
             errors = [run.error for run in result.runs if run.error is not None]
             if errors:
                 message(f"{name}: {len(errors)} of {len(benchmark)} runs could not be done; the first: {errors[0]}")

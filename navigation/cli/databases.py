@@ -11,7 +11,7 @@ import tyro
 from tussock.world.errors import InputError, SettingError
 
 from ..training_setup import ROUTE_SPACING
-from .options import RouteOptions, ViewOptions, open_renderer
+from .options import Command, RouteOptions, ViewOptions, open_renderer
 from .terminal import message, progress
 from .worlds import numbers
 
@@ -36,8 +36,6 @@ class DatabaseGridCommand(ViewOptions):
     """.. from here .. Default: 0,0, or the world's corner where that lies farther inside."""
     to_m: Annotated[str | None, tyro.conf.arg(metavar="X,Y")] = None
     """.. to here. Default: 10,10, or the world's corner where that lies farther inside."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         if not (math.isfinite(self.spacing_m) and self.spacing_m >= MIN_SPACING):
@@ -71,24 +69,18 @@ class DatabaseRouteCommand(RouteOptions):
     """Folder to write; one that was interrupted is completed."""
     spacing_m: float = ROUTE_SPACING
     """Distance between views."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
-        surroundings = self.surroundings()
-        world = surroundings.open_world()
-        route = surroundings.open_route(world)
+        world, route = self.surroundings().open_world_and_route()
         return write(self, world, route.resampled(self.spacing_m).poses, self.out)
 
 
 @dataclass
-class DatabaseCheckCommand:
+class DatabaseCheckCommand(Command):
     """Look for what is wrong with an image database; exit with 1 where something is."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
     """Folder of the database."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         import dataclasses
@@ -103,9 +95,12 @@ class DatabaseCheckCommand:
         except InputError:  # it is among the problems
             kind, images = None, None
         return {
-            "database": str(self.folder), "type": kind, "images": images,
-            "problems": [dataclasses.asdict(problem) for problem in problems], "ok": not problems,
-        }  # fmt: skip
+            "database": str(self.folder),
+            "type": kind,
+            "images": images,
+            "problems": [dataclasses.asdict(problem) for problem in problems],
+            "ok": not problems,
+        }
 
 
 def write(options: ViewOptions, world: "World", poses: "Poses | Grid", out: Path) -> dict[str, Any]:
@@ -118,6 +113,9 @@ def write(options: ViewOptions, world: "World", poses: "Poses | Grid", out: Path
         with progress("drawing", "views") as report:
             database, rendered = write_database(out, renderer, poses, report)
     return {
-        "database": str(out), "type": database.kind, "images": len(database), "rendered": rendered,
+        "database": str(out),
+        "type": database.kind,
+        "images": len(database),
+        "rendered": rendered,
         "seconds": time.perf_counter() - began,
-    }  # fmt: skip
+    }

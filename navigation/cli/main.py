@@ -55,10 +55,12 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"tussock {version('tussock')}")
         return
     command = tyro.cli(
-        choice_of(commands_for(arguments)), prog="tussock", args=arguments,
+        choice_of(commands_for(arguments)),
+        prog="tussock",
+        args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
         description="Insect visual route navigation: make a world, look around in it, learn a route, walk it home.",
-    )  # fmt: skip
+    )
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
     try:
         if command.json:

@@ -13,7 +13,7 @@ import tyro
 from tussock.world.errors import FileError, SettingError
 
 from ..experiment import MODEL_SUFFIX
-from .options import LearningOptions, ModelOptions, RunOptions, open_renderer
+from .options import Command, LearningOptions, ModelOptions, RunOptions, open_renderer
 from .terminal import message, progress, progress_of_parts
 
 
@@ -27,8 +27,6 @@ class EvaluateCommand(ModelOptions):
     """.. within this distance of the route."""
     scan_deg: float = 360.0
     """Width of the scan; under 360 it is centred on the right heading."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..evaluation import grid_positions, heading_errors
@@ -37,28 +35,21 @@ class EvaluateCommand(ModelOptions):
         if not 0 < self.scan_deg <= 360:
             raise SettingError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
         experiment = self.experiment()
-        world = experiment.open_world()
-        route = experiment.open_route(world)
+        world, route = experiment.open_world_and_route()
         positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
         with open_renderer(experiment, world) as renderer:
             message(f"renderer: {renderer.backend}")
             with progress("learning", "views") as report:
                 trained = experiment.train(renderer, route, report)
             assert trained.model is not None
+            model, encoding = trained.model.model, experiment.encoding
             views = route.resampled(experiment.training.spacing)
             with progress("recovering headings", "positions") as report:
-                errors = heading_errors(
-                    trained.model.model,
-                    experiment.encoding,
-                    renderer,
-                    views,
-                    positions,
-                    scan=math.radians(self.scan_deg),
-                    progress=report,
-                )
+                scan = math.radians(self.scan_deg)
+                errors = heading_errors(model, encoding, renderer, views, positions, scan=scan, progress=report)
         return {
-            "model": str(trained.model.model),
-            "encoding": str(experiment.encoding),
+            "model": str(model),
+            "encoding": str(encoding),
             "n_views": None if trained.poses is None else len(trained.poses),
             "n_positions": len(positions),
             "median_error_deg": errors.median_error_deg,
@@ -80,8 +71,6 @@ class TrainCommand(ModelOptions):
     """File to write."""
     learning_walk_m: float = RunOptions.learning_walk_m
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is the thesis's training."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         import numpy as np
@@ -103,8 +92,7 @@ class TrainCommand(ModelOptions):
             raise SettingError(
                 f"{self.model}: {model} learns all its views at once and cannot go on; give --model '{model}'"
             )
-        world = experiment.open_world()
-        route = experiment.open_route(world)
+        world, route = experiment.open_world_and_route()
         with open_renderer(experiment, world) as renderer, progress("drawing", "views") as report:
             wanted = experiment.training_poses(world, route)
             views, poses = training_views(experiment.encoding, renderer, wanted, report)
@@ -142,8 +130,6 @@ class CompareCommand(LearningOptions):
     """.. within this distance of the route."""
     offset_m: float = 0.1
     """The walk home starts this far to the left of the route (negative: right)."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from tussock.world.specs import split_list
@@ -157,8 +143,7 @@ class CompareCommand(LearningOptions):
         specs = {name: model_spec(name) for name in dict.fromkeys(names)}
         for spec in specs.values():
             experiment.replace(model=spec)  # refuses bad parameters before the work begins
-        world = experiment.open_world()
-        route = experiment.open_route(world)
+        world, route = experiment.open_world_and_route()
         positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
         rows = {}
         with open_renderer(experiment, world) as renderer, progress("comparing", "models") as report:
@@ -178,11 +163,8 @@ class CompareCommand(LearningOptions):
 
 
 @dataclass
-class ModelsCommand:
+class ModelsCommand(Command):
     """List the familiarity models, what they do and where they come from."""
-
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..models import MODELS, OPPONENT
@@ -208,8 +190,6 @@ class RunCommand(RunOptions):
     """Also stream to a running rerun viewer, at --viewer."""
     viewer: str = "rerun+http://127.0.0.1:9876/proxy"
     """Address of the viewer for --live."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..recording.run_folder import check_run_folder, record_run
@@ -219,18 +199,12 @@ class RunCommand(RunOptions):
         check_run_folder(self.out, overwrite=self.overwrite, inputs=files, viewer=viewer)
         experiment = self.experiment()
         with progress_of_parts() as report:
-            return record_run(
-                experiment,
-                self.out,
-                overwrite=self.overwrite,
-                viewer=viewer,
-                learning=partial(report, "learning"),
-                walking=partial(report, "walking"),
-            )
+            parts = {part: partial(report, part) for part in ("learning", "walking")}
+            return record_run(experiment, self.out, overwrite=self.overwrite, viewer=viewer, **parts)
 
 
 @dataclass
-class PlayCommand:
+class PlayCommand(Command):
     """Open a run's recording in the rerun viewer."""
 
     run_folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
@@ -239,8 +213,6 @@ class PlayCommand:
     """Serve the viewer to a browser on this machine instead of opening a window."""
     screenshot: Path | None = None
     """Save a picture (.png) of the viewer instead, without a display."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..recording.run_folder import play

@@ -14,6 +14,7 @@ import attrs
 import tyro
 
 from tussock.render.eye import Eye
+from tussock.world.errors import SettingError
 
 from ..body import Body
 from ..experiment import Experiment
@@ -38,8 +39,34 @@ def default(kind: type, field: str) -> Any:
     return attrs.fields_dict(kind)[field].default if attrs.has(kind) else getattr(kind, field)
 
 
+@dataclass(kw_only=True)
+class Command:
+    """What all commands have."""
+
+    json: bool = False
+    """Print one JSON object instead of text."""
+
+
+@dataclass(kw_only=True)
+class WorkerOptions(Command):
+    """What does many runs."""
+
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this command alone."""
+    workers: int | None = None
+    """Number of workers on this machine. Default: one per core."""
+
+    def chosen_workers(self) -> str | int | None:
+        """What does the runs, as `run_sweep` takes it. Raises SettingError for contradicting flags."""
+        if self.workers is not None and self.workers < 1:
+            raise SettingError(f"--workers {self.workers}: give at least 1")
+        if self.scheduler is not None and self.workers is not None:
+            raise SettingError("--workers are those on this machine; a scheduler has its own: give one of the two")
+        return self.workers if self.scheduler is None else self.scheduler
+
+
 @dataclass
-class ViewOptions:
+class ViewOptions(Command):
     """What world is seen, through what eye."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = default(Surroundings, "world")

@@ -11,8 +11,7 @@ import tyro
 
 from tussock.world.errors import SettingError
 
-from .options import WORLD, flags_of
-from .sweeps import check_workers
+from .options import WORLD, WorkerOptions, flags_of
 from .terminal import message, progress
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class ProtocolCommand:
+class ProtocolCommand(WorkerOptions):
     """Do a published experiment again."""
 
     PROTOCOL: ClassVar[str]
@@ -36,16 +35,10 @@ class ProtocolCommand:
     """See triangles only from their front, as the original Sussex renderer did."""
     quick: bool = False
     """A first look of some minutes: fewer worlds and starts."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this command alone."""
-    workers: int | None = None
-    """Number of workers on this machine. Default: one per core."""
     out: Path | None = None
     """Folder for the runs and the report; runs that are finished there are not done again. Default: the protocol's name."""
     overwrite: bool = False
     """Replace the report of something else in the folder."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..reports.report import check_report_folder
@@ -59,15 +52,9 @@ class ProtocolCommand:
         check_report_folder(out, about, overwrite=self.overwrite)
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
+            command = self.command(out)
             return replicate(
-                protocol,
-                sweep,
-                out,
-                about=about,
-                command=self.command(out),
-                scheduler=self.scheduler,
-                workers=self.workers,
-                progress=report,
+                protocol, sweep, out, about=about, command=command, workers=self.chosen_workers(), progress=report
             )
 
     def protocol(self) -> "Protocol":
@@ -89,7 +76,7 @@ class ProtocolCommand:
             raise SettingError("--worlds is for generated routes; give it, or --route")
         if self.route and self.world is None:
             raise SettingError("--route leads through a world; give --world as well")
-        check_workers(self.scheduler, self.workers)
+        self.chosen_workers()
 
     def routes(self) -> list[Path]:
         """The given route files."""

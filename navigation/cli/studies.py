@@ -37,8 +37,6 @@ class StudyOptions(RouteOptions):
     """Folder for the report; studies that were finished there are not done again."""
     overwrite: bool = False
     """Replace the report of something else in the folder."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def replicate(self, names: tuple[str, ...], title: str, only: str | None = None) -> dict[str, Any]:
         """Do studies for all seeds and write the report. only: the one figure or table to make."""
@@ -102,15 +100,13 @@ class StudyOptions(RouteOptions):
         if self.grid_database is not None and self.route_database is not None:
             return data_of_databases(self.grid_database, self.route_database)
         surroundings = dataclasses.replace(self, seed=seed).surroundings()
-        world = surroundings.open_world()
-        route = surroundings.open_route(world)
+        world, route = surroundings.open_world_and_route()
         return data_of_world(world, route, surroundings.eye, spacing=self.spacing_m, backend=self.renderer)
 
     def settings(self) -> dict[str, Any]:
-        """The settings that the flags give, without those of a run. A first look takes half as many columns and rows."""
-        names = [each.name for each in dataclasses.fields(RouteOptions)]
+        """The settings that the flags give. A first look takes half as many columns and rows."""
         size = "360x75" if self.quick and self.size is None else self.size
-        return {name: getattr(self, name) for name in names} | {"size": size}
+        return super().settings() | {"size": size}
 
     def about(self, names: tuple[str, ...]) -> dict[str, Any]:
         """What is studied, for the head of the report."""

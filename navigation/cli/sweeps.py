@@ -9,25 +9,20 @@ import tyro
 
 from tussock.world.errors import SettingError
 
+from .options import Command, WorkerOptions
 from .terminal import message, progress
 
 
 @dataclass
-class SweepCommand:
+class SweepCommand(WorkerOptions):
     """Do every run that a sweep file asks for: models, worlds, starts, noise, in all combinations."""
 
     sweep: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="SWEEP.toml")]
     """What to vary and what not (docs/sweeps.md)."""
     out: Path = Path("sweep")
     """Folder for the table of runs; runs that are finished there are not done again."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """A running Dask scheduler, whose workers do the runs. Default: workers on this machine, for this sweep alone."""
-    workers: int | None = None
-    """How many of these. Default: one a core."""
     record: Annotated[str | None, tyro.conf.arg(metavar="worst:N")] = None
     """Keep recordings of the N worst runs."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..sweeps.sweep_file import read_sweep
@@ -35,28 +30,26 @@ class SweepCommand:
         record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
         if record is None:
             raise SettingError(f"--record {self.record!r}: give worst:5, or another number")
-        check_workers(self.scheduler, self.workers)
+        workers = self.chosen_workers()
         sweep = read_sweep(self.sweep)
 
         from ..sweeps.sweep import record_worst, run_sweep
 
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
-            done = run_sweep(sweep, self.out, scheduler=self.scheduler, workers=self.workers, progress=report)
+            done = run_sweep(sweep, self.out, workers=workers, progress=report)
         recorded = record_worst(sweep, self.out, int(record[1])) if self.record else []
         return done | {"recordings": [str(folder) for folder in recorded]}
 
 
 @dataclass
-class ReportCommand:
+class ReportCommand(Command):
     """Report the results of a sweep: a page with success and error by each axis, models in pairs, and the worst walks."""
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
     """Folder of the sweep; it may still go on."""
     worst: int = 5
     """How many of the worst walks to show."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from ..sweeps.report import REPORT, RESULTS, write_sweep_report
@@ -66,14 +59,9 @@ class ReportCommand:
         with progress("drawing", "figures") as report:
             results = write_sweep_report(self.folder, worst=self.worst, progress=report)
         return {
-            "report": str(self.folder / REPORT), "results": str(self.folder / RESULTS), "runs": results["runs"],
+            "report": str(self.folder / REPORT),
+            "results": str(self.folder / RESULTS),
+            "runs": results["runs"],
             "could_not_run": len(results["could_not_run"]),
-        } | {measure: found["value"] for measure, found in results["measures"].items()}  # fmt: skip
-
-
-def check_workers(scheduler: str | None, workers: int | None) -> None:
-    """Refuse contradicting flags on what does the runs. Raises SettingError."""
-    if workers is not None and workers < 1:
-        raise SettingError(f"--workers {workers}: give at least 1")
-    if scheduler is not None and workers is not None:
-        raise SettingError("--workers are those on this machine; a scheduler has its own: give one of the two")
+            **{measure: found["value"] for measure, found in results["measures"].items()},
+        }

@@ -60,15 +60,9 @@ def progress(what: str, unit: str, *, verbose: bool = False) -> Iterator[Callabl
     """
     # Late: rich takes a tenth of a second that --help does not need.
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(unit),
-        TimeRemainingColumn(),
-    )
+    columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), unit, TimeRemainingColumn())
     console = Console(stderr=True)
     pace = _Pace(unit) if verbose else None
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:

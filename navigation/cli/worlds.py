@@ -10,12 +10,12 @@ import tyro
 from tussock.world.errors import FileError, SettingError
 
 from ..surroundings import Surroundings
-from .options import WORLD, ViewOptions, open_renderer
+from .options import WORLD, Command, ViewOptions, open_renderer
 from .terminal import message
 
 
 @dataclass
-class WorldCommand:
+class WorldCommand(Command):
     """Generate a world and save it."""
 
     out: Path
@@ -26,8 +26,6 @@ class WorldCommand:
     """The same seed gives the same file."""
     picture: Path | None = None
     """Also draw the world from above into this file (.png or .svg)."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from tussock.world.atomic import check_writable
@@ -55,8 +53,6 @@ class ViewCommand(ViewOptions):
     """PNG to write: ahead in the middle, behind at both edges."""
     alpha: bool = False
     """Write RGBA: alpha is the share of each pixel that is not open sky."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         import cv2
@@ -92,7 +88,7 @@ class ViewCommand(ViewOptions):
 
 
 @dataclass
-class RouteCommand:
+class RouteCommand(Command):
     """Find a walkable route through a world and save it; several seeds and one goal give several routes to one place."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
@@ -108,8 +104,6 @@ class RouteCommand:
     """File to write (.csv)."""
     picture: Path | None = None
     """Also draw world and route from above into this file (.png or .svg)."""
-    json: bool = False
-    """Print one JSON object instead of text."""
 
     def run(self) -> dict[str, Any]:
         from tussock.world.atomic import check_writable

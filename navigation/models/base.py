@@ -30,7 +30,7 @@ class FamiliarityModel(Protocol):
     """Learns the views of a route and scores other views by how familiar they are at every rotation.
 
     Views are feature images (n, h, w) as an `Encoding` makes them; for training they face along the route. Views of several routes
-    are learned one route after the other. A model may also have `score(views)` and `memory_bytes`; see the functions of these names.
+    are learned one route after the other. A model may also have `memory_bytes`; see the function of this name.
     """
 
     def fit(self, views: Images) -> Any:
@@ -82,12 +82,6 @@ class SequenceModel(SnapshotModel, Protocol):
     def follow(self) -> Following:
         """Begin a walk, with unknown progress."""
         ...
-
-
-def score(model: FamiliarityModel, views: Images) -> Float32[torch.Tensor, " n"]:
-    """Familiarity of each view at its present heading, of any model."""
-    own = getattr(model, "score", None)
-    return model.scan(views)[:, 0] if own is None else own(views)
 
 
 def memory_bytes(model: FamiliarityModel) -> int | None:

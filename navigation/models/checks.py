@@ -3,7 +3,7 @@
 import torch
 from jaxtyping import Float32
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import SettingError, first_line
 
 # Columns of a view. At the upper limit the engine's matrices for the inverse transform take 67 MB each.
 MIN_COLUMNS, MAX_COLUMNS = 4, 8192
@@ -57,8 +57,3 @@ def all_bounded(tensor: torch.Tensor) -> bool:
         return True
     least, greatest = tensor.aminmax()
     return float(least) >= -MAX_VALUE and float(greatest) <= MAX_VALUE  # both are nan if a value is
-
-
-def first_line(error: Exception) -> str:
-    """The message of an exception, without the lines that only programmers read."""
-    return (str(error).splitlines() or [type(error).__name__])[0]

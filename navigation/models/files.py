@@ -14,13 +14,13 @@ from safetensors.torch import save
 
 from tussock.render.eye import Eye
 from tussock.world.atomic import replacing
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import FileError, SettingError, first_line
 from tussock.world.settings import instance_of, settings
 from tussock.world.specs import Spec
 
 from ..encoding import OLD_NAMES, STEPS, Encoding
 from .base import FamiliarityModel, Model
-from .checks import check_device, first_line
+from .checks import check_device
 from .opponents import OPPONENT, Opponent
 from .registry import MODELS
 from .specs import find_model, make_model, present_names

@@ -67,9 +67,8 @@ class NearestFilters:
         self._odd = torch.fft.irfft(1j * identity, n=width, dim=0)[:count].float()
         self._left = torch.arange(count, device=filters.device)  # rotations 0, 1, .. w // 2
         self._right = -self._left % width  # and the same to the right
-        self._filters = [
-            _parts(torch.fft.rfft(block)).mT.contiguous() for block in filters.split(FILTERS)
-        ]  # (f, 2 h, m)
+        # Blocks of (f, 2 h, m).
+        self._filters = [_parts(torch.fft.rfft(block)).mT.contiguous() for block in filters.split(FILTERS)]
         self._biases = biases.split(FILTERS)
 
     def nearest(

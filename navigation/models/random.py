@@ -33,7 +33,7 @@ class RandomHeadings(Model):
         column = np.arange(len(columns))
         self._columns = columns[
             (column[:, None] + column) % len(columns)
-        ]  # (w, w) weight of each column at each rotation
+        ]  # (w, w) that of each column at each rotation
 
     def _scan(self, views: Images) -> Scans:
         pixels = views.cpu().numpy() + np.float32(0)  # -0 becomes 0

@@ -8,6 +8,8 @@ from tussock.world.settings import number, whole
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .filter_bank import FilterBank
 
+Parameters = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # weights, visible biases, hidden biases
+
 
 @model
 class RBM(Model):
@@ -44,31 +46,22 @@ class RBM(Model):
         velocities = [torch.zeros_like(each) for each in parameters]
         for _ in range(self.epochs):
             for batch in torch.randperm(len(data), generator=random).split(self.batch_size):
-                gradients = self._gradients(data[batch.to(self.device)], *parameters, random)
+                gradients = self._gradients(data[batch.to(self.device)], parameters, random)
                 for parameter, velocity, gradient in zip(parameters, velocities, gradients, strict=True):
                     velocity.mul_(self.momentum).add_(gradient, alpha=self.rate / len(batch))
                     parameter += velocity
         shape = views.shape[1:]
         return {"weights": weights.reshape(-1, *shape), "visible": visible.reshape(shape), "hidden": hidden}
 
-    def _gradients(
-        self,
-        data: torch.Tensor,
-        weights: torch.Tensor,
-        visible: torch.Tensor,
-        hidden: torch.Tensor,
-        random: torch.Generator,
-    ) -> tuple[torch.Tensor, ...]:
-        """Of the log-probability of a batch by weights, visible and hidden biases, by CD-1."""
+    def _gradients(self, data: torch.Tensor, parameters: Parameters, random: torch.Generator) -> Parameters:
+        """Of the log-probability of a batch by each of the parameters, by CD-1."""
+        weights, visible, hidden = parameters
         on = torch.sigmoid(hidden + data @ weights.T)
         sample = (torch.rand(on.shape, generator=random).to(self.device) < on).float()
         reconstruction = visible + sample @ weights
         on_again = torch.sigmoid(hidden + reconstruction @ weights.T)
-        return (
-            on.T @ data - on_again.T @ reconstruction,
-            (data - reconstruction).sum(dim=0),
-            (on - on_again).sum(dim=0),
-        )
+        of_weights = on.T @ data - on_again.T @ reconstruction
+        return of_weights, (data - reconstruction).sum(dim=0), (on - on_again).sum(dim=0)
 
     def _shapes(self, height: int, width: int) -> Shapes:
         return {"weights": (self.units, height, width), "visible": (height, width), "hidden": (self.units,)}

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from tussock.world.errors import SettingError
-from tussock.world.specs import Spec, parse_spec, split_words
+from tussock.world.specs import Spec
 
 from .base import FamiliarityModel
 from .opponents import OPPONENT, opponents_of
@@ -31,15 +31,7 @@ def make_model(text: str, **parameters: Any) -> Any:
 
 def model_spec(text: str) -> Spec:
     """The spec that a text holds, as for `make_model`. Raises SettingError for an unknown name or parameter."""
-    try:
-        name, *words = split_words(text) or [""]
-        pairs = [word.partition("=") for word in words]
-        former = getattr(find_model(name), "renamed", {})
-        return parse_spec(
-            " ".join([name, *(former.get(key, key) + sign + value for key, sign, value in pairs)]), find_model
-        )
-    except SettingError as error:
-        raise error if repr(text) in str(error) else SettingError(f"model {text!r}: {error}") from error
+    return MODELS.spec(text, find_model)
 
 
 def find_model(name: str, *, importing: bool = True) -> Callable[..., FamiliarityModel]:

@@ -21,13 +21,8 @@ from ..trajectory import Trajectory
 from .log import Recording
 from .viewer import check_viewer, save_screenshot, watch
 
-RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE = (
-    "recording.rrd",
-    "trajectory.csv",
-    "summary.json",
-    "overview.png",
-    "route.csv",
-)
+RECORDING, TRAJECTORY, SUMMARY = "recording.rrd", "trajectory.csv", "summary.json"
+PICTURE, ROUTE = "overview.png", "route.csv"
 UNFINISHED = "UNFINISHED.txt"  # is there until all the others are
 FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE, UNFINISHED)
 TRAINING_SETTINGS = ("every", "learning_walk_m")  # settings that do not apply to a model from a file

@@ -54,6 +54,23 @@ class Claim:
     note: str = ""
 
 
+def claim(key: str, figure: str, test: str, **others: Any) -> Callable[[Callable[[StudyResults], Decision]], Claim]:
+    """Decorator: turns a function that does a claim's test into the claim. The function's docstring is the statement.
+
+    Args:
+        key: See `Claim`.
+        figure: See `Claim`.
+        test: See `Claim`.
+        others: `published` and `note`, where there are any.
+    """
+
+    def made(decide: Callable[[StudyResults], Decision]) -> Claim:
+        statement = " ".join((decide.__doc__ or "").split())
+        return Claim(key=key, statement=statement, figure=figure, test=test, decide=decide, **others)
+
+    return made
+
+
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
     """A claim and the results of its test, one for each run of the study. Runs differ in their seeds.

@@ -107,30 +107,14 @@ def draw_route(axes: Axes, route: Route, **style) -> None:
 def draw_arrows(axes: Axes, x, y, heading_deg, colour, length=ARROW, **style) -> None:
     """Draw arrows from points (m) towards headings (degrees). Colours and lengths (m): one for all, or one for each."""
     angle = np.radians(np.asarray(heading_deg))
-    axes.quiver(
-        x,
-        y,
-        np.cos(angle) * length,
-        np.sin(angle) * length,
-        color=colour,
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        units="inches",
-        width=0.022,
-        headwidth=3.6,
-        headlength=4.5,
-        headaxislength=4,
-        zorder=4,
-        **style,
-    )
+    style |= {"angles": "xy", "scale_units": "xy", "scale": 1, "color": colour, "zorder": 4}
+    style |= {"units": "inches", "width": 0.022, "headwidth": 3.6, "headlength": 4.5, "headaxislength": 4}
+    axes.quiver(x, y, np.cos(angle) * length, np.sin(angle) * length, **style)
 
 
 def _draw_world(axes: Axes, world: World) -> None:
     triangles, rgb = world.surfaces()
-    order = (
-        triangles[..., 2].max(axis=1).argsort(kind="stable")
-    )  # lower triangles first, so that higher ones cover them
+    order = triangles[..., 2].max(axis=1).argsort(kind="stable")  # lower ones first, so that higher ones cover them
     surfaces = PolyCollection(
         list(triangles[order, :, :2]),
         facecolors=rgb[order] / 255,

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, InputError
+from tussock.world.progress import Progress, no_progress
 
 from .claims import Outcome
 from .drawing import STYLE, Image, save_figure
@@ -172,9 +173,7 @@ class Report:
     results_file: str = field(default=RESULTS)
 
 
-def write_report(
-    report: Report, folder: Path, progress: Callable[[int, int], object] = lambda done, total: None
-) -> dict[str, Any]:
+def write_report(report: Report, folder: Path, progress: Progress = no_progress) -> dict[str, Any]:
     """Write a report's figures (PNG and SVG), JSON file and page.
 
     Args:

@@ -83,9 +83,13 @@ class RouteFollowingVector(VectorEnv):
     """
 
     def __init__(
-        self, num_envs: int = 1, *, render_mode: str | None = None,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP, **settings: Any,
-    ):  # fmt: skip
+        self,
+        num_envs: int = 1,
+        *,
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **settings: Any,
+    ):
         if isinstance(num_envs, bool) or not isinstance(num_envs, Integral) or num_envs < 1:
             raise SettingError(f"{num_envs!r} environments; give a whole number from 1")
         self.task, self.num_envs = RouteTask(**settings), int(num_envs)
@@ -102,9 +106,11 @@ class RouteFollowingVector(VectorEnv):
         self._ended = np.zeros(num_envs, bool)
 
     def reset(
-        self, *, seed: int | np.integer | Sequence[int | np.integer | None] | None = None,
+        self,
+        *,
+        seed: int | np.integer | Sequence[int | np.integer | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[np.ndarray, dict[str, Any]]:  # fmt: skip
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin other walks: all, or those where options["reset_mask"] says so. A seed s is s, s + 1, ... for the walks."""
         if isinstance(seed, Sequence):
             seeds = [_seed(each) for each in seed]
@@ -217,6 +223,7 @@ def _frame(view: np.ndarray) -> np.ndarray:
 
 if ID not in gymnasium.registry:
     gymnasium.register(
-        ID, entry_point="tussock.navigation.rl.environment:RouteFollowing",
+        ID,
+        entry_point="tussock.navigation.rl.environment:RouteFollowing",
         vector_entry_point="tussock.navigation.rl.environment:RouteFollowingVector",
-    )  # fmt: skip
+    )

@@ -133,8 +133,7 @@ class Courses:
         """The course of a seed."""
         if seed not in self._open:
             experiment = self.task.experiment.replace(seed=seed)
-            world = experiment.open_world()
-            route = experiment.open_route(world)
+            world, route = experiment.open_world_and_route()
             for side in (-1, 1):
                 check_inside(route.start.moved(0.0, side * self.task.offset), world.field)
             self._open[seed] = Course(experiment.open_renderer(world), route)

@@ -1,7 +1,6 @@
 """What a sweep asks for: experiments, and the axes along which they differ."""
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -52,8 +51,3 @@ class Sweep:
 
     def __str__(self) -> str:
         return ", ".join(f"{len(choices)} of {name}" for name, choices in self.axes.items())
-
-
-def combinations(axes: Mapping[str, Sequence[Any]]) -> int:
-    """How many combinations there are of one choice of every axis."""
-    return math.prod(map(len, axes.values()))

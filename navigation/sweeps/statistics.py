@@ -55,13 +55,12 @@ class Pairing:
     worse: dict[str, int]
 
 
-def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"], seed: int = 0) -> Interval:
+def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]) -> Interval:
     """Mean of values and its percentile bootstrap interval. Whole groups are drawn, as runs in one world are not independent.
 
     Args:
         values: The values.
         groups: Number of each value's group. For a single group, single values are drawn.
-        seed: Seed of the draws.
 
     Returns:
         The interval; nan for what is undetermined: the mean of no values, and the interval of fewer than two.
@@ -72,7 +71,7 @@ def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]
         groups = np.arange(len(values))
     _, number = np.unique(groups, return_inverse=True)
     sums, counts = np.bincount(number, weights=values), np.bincount(number)
-    rng, batch = np.random.default_rng(seed), min(SAMPLES, max(1, MAX_DRAWS // len(sums)))
+    rng, batch = np.random.default_rng(0), min(SAMPLES, max(1, MAX_DRAWS // len(sums)))
     means = np.empty(SAMPLES)
     for begin in range(0, SAMPLES, batch):
         part = means[begin : begin + batch]

@@ -89,19 +89,7 @@ class Store:
         """Keep finished runs: all of them, or, where that fails, none. Raises FileError."""
         try:
             with self._database:
-                self._database.executemany(
-                    "INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?)",
-                    [
-                        (
-                            run.key,
-                            json.dumps(run.settings),
-                            json.dumps(run.row),
-                            zlib.compress(run.steps.encode()),
-                            run.again,
-                        )
-                        for run in runs
-                    ],
-                )
+                self._database.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?)", map(_packed, runs))
         except sqlite3.Error as error:
             raise _unusable(self.folder / FINISHED, error) from error
 
@@ -133,6 +121,11 @@ class Store:
 
     def __exit__(self, kind, error, at) -> None:
         self.close()
+
+
+def _packed(run: Finished) -> tuple[str, str, str, bytes, bool]:
+    """A run as a row of the database."""
+    return run.key, json.dumps(run.settings), json.dumps(run.row), zlib.compress(run.steps.encode()), run.again
 
 
 def _locked(folder: Path) -> FileLock:

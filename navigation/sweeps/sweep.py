@@ -13,7 +13,7 @@ from distributed import CancelledError, Client, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
-from tussock.world.errors import FileError, InputError, MissingDependencyError
+from tussock.world.errors import FileError, InputError, MissingDependencyError, first_line
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
@@ -22,25 +22,32 @@ from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
 from .store import Finished, Store, table_of, write_table
-from .work import Walked, learn, open_world_and_route, walk
+from .work import Walked, learn, walk
 
 log = logging.getLogger(__name__)
 
 WORST = "worst"  # folder of the recordings
 SECONDS = 10.0  # to wait for a scheduler
+LOCAL: dict[str, Any] = {  # options of the workers on this machine, which nobody else can reach
+    "threads_per_worker": 1,
+    "memory_limit": None,
+    "silence_logs": logging.CRITICAL,
+    "preload": [work.__name__],
+    "host": "127.0.0.1",
+    **dict.fromkeys(("dashboard_address", "worker_dashboard_address"), "127.0.0.1:0"),
+}
 
 
 def run_sweep(
-    sweep: Sweep, out: Path, *, scheduler: str | None = None, workers: int | None = None,
-    progress: Progress = no_progress,
-) -> dict[str, Any]:  # fmt: skip
+    sweep: Sweep, out: Path, *, workers: str | int | None = None, progress: Progress = no_progress
+) -> dict[str, Any]:
     """Do the runs of a sweep that the folder does not hold yet, keeping each as soon as it is finished.
 
     Args:
         sweep: What is asked for.
         out: The folder.
-        scheduler: Address of a running Dask scheduler; None starts workers on this machine, for this sweep alone.
-        workers: How many of these; None means one for each core.
+        workers: Address of a running Dask scheduler, whose workers do the runs; or the number of workers that are started on this
+            machine, for this sweep alone; None means one for each core.
         progress: Called with how many runs are finished, of how many.
 
     Returns:
@@ -59,7 +66,7 @@ def run_sweep(
         try:
             if missing:
                 before = len(runs) - len(missing)
-                _run(missing, store, scheduler, workers, lambda done: progress(before + done, len(runs)))
+                _run(missing, store, workers, lambda done: progress(before + done, len(runs)))
         except BaseException:
             with suppress(InputError):  # what ended the sweep matters more, a full disk above all
                 _write_table(store, out)
@@ -67,10 +74,13 @@ def run_sweep(
         path = _write_table(store, out)
         rows = [row for key, row in store.rows().items() if key in runs]
     return {
-        "table": str(path), "runs": len(runs), "done_before": len(runs) - len(missing),
-        "arrived": sum(row.get("arrived", False) for row in rows), "could_not_run": sum(row["error"] is not None for row in rows),
+        "table": str(path),
+        "runs": len(runs),
+        "done_before": len(runs) - len(missing),
+        "arrived": sum(row.get("arrived", False) for row in rows),
+        "could_not_run": sum(row["error"] is not None for row in rows),
         "seconds": time.perf_counter() - began,
-    }  # fmt: skip
+    }
 
 
 def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
@@ -88,15 +98,11 @@ def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
 
 
 def _run(
-    missing: dict[str, Experiment],
-    store: Store,
-    scheduler: str | None,
-    workers: int | None,
-    progress: Callable[[int], object],
+    missing: dict[str, Experiment], store: Store, workers: str | int | None, progress: Callable[[int], object]
 ) -> None:
     """Do runs on a cluster and keep their results. Raises InputError for those that could not be finished."""
     done, unfinished = 0, []
-    with cluster(scheduler, workers) as client:
+    with cluster(workers) as client:
         for batch in _finished(client, missing):
             kept = []
             for key, result in batch:
@@ -109,10 +115,9 @@ def _run(
             progress(done)
     if unfinished:
         key, error = unfinished[0]
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
             f"{len(unfinished)} of {len(missing)} runs could not be finished; all others are kept, and the same command tries again. "
-            f"The first, {run_command(missing[key], f'run-{key}')}: {first}"
+            f"The first, {run_command(missing[key], f'run-{key}')}: {first_line(error)}"
         )
 
 
@@ -120,7 +125,7 @@ def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[t
     """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
     futures = {}
     for key, experiment in missing.items():
-        path = client.submit(open_world_and_route, experiment, key=route_key(experiment))
+        path = client.submit(Experiment.open_world_and_route, experiment, key=route_key(experiment))
         trained = client.submit(learn, experiment, path, key=training_key(experiment))
         futures[client.submit(walk, experiment, trained, key=f"run-{key}")] = key
     path = trained = None  # so that workers forget worlds and models when the last run that needs them is done
@@ -143,15 +148,13 @@ def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[t
 
 
 @contextmanager
-def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+def cluster(workers: str | int | None) -> Iterator[Client]:
     """A client of a running cluster, or of one that lives as long as the block, on this machine and for it alone."""
     with ExitStack() as stack:
-        if scheduler is None:
-            local: Any = LocalCluster(
-                n_workers=workers or core_count(), threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
-                worker_dashboard_address="127.0.0.1:0", memory_limit=None, silence_logs=logging.CRITICAL,
-                preload=[work.__name__],
-            )  # fmt: skip
+        if isinstance(workers, str):
+            scheduler = workers
+        else:
+            local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)
             scheduler = stack.enter_context(local).scheduler_address
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are reported in one line, below
         try:

@@ -18,7 +18,7 @@ from tussock.world.params import is_generated
 from ..experiment import MODEL_SUFFIX, Experiment
 from ..experiment_settings import TYPES, experiment_of
 from ..models.files import TrainedModel
-from .spec import Sweep, combinations
+from .spec import Sweep
 
 MAX_RUNS = 1_000_000
 ALWAYS = {"threads": 1}  # where a sweep file does not say otherwise: runs share the cores
@@ -66,7 +66,7 @@ class _Reader:
                 raise self.error("axes", name, f"{name} is there twice; leave one out")
             axes[name.replace("-", "_")] = self.choices(name, values)
         self.check_names(fixed, axes)
-        if (count := combinations(axes)) > MAX_RUNS:
+        if (count := math.prod(map(len, axes.values()))) > MAX_RUNS:
             raise FileError(f"{self.path} asks for {count:,} runs; ask for {MAX_RUNS:,} at most")
         title = self.document.get("title", self.path.stem)
         return Sweep(title, axes, list(self.experiments(fixed, axes, count)))

@@ -39,12 +39,6 @@ def dask_setup(worker: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def open_world_and_route(experiment: Experiment) -> tuple[World, Route]:
-    """The world of an experiment, and the route through it."""
-    world = experiment.open_world()
-    return world, experiment.open_route(world)
-
-
 def learn(experiment: Experiment, path: tuple[World, Route]) -> TrainedNavigator:
     """What the navigator of an experiment learns before the walk."""
     world, route = path

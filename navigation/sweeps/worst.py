@@ -50,8 +50,7 @@ def _draw(row: dict[str, Any], steps: pd.DataFrame, shown: int) -> Iterator[Figu
     """The walk from above, and the view at one of its steps. Raises InputError where its world or model cannot be opened."""
     experiment, step = experiment_of({name: row.get(name) for name in TYPES}), steps.iloc[shown]
     pose = np.array([[step["x_m"], step["y_m"], np.radians(step["heading_deg"])]])
-    world = experiment.open_world()
-    route = experiment.open_route(world)
+    world, route = experiment.open_world_and_route()
     with experiment.open_renderer(world) as renderer:
         view, match = renderer.render(pose)[0], None
         if isinstance(experiment.model, Spec) and not pd.isna(step["match"]):

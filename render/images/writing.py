@@ -3,7 +3,6 @@
 import hashlib
 import os
 import time
-from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from jaxtyping import Float, UInt8
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, SettingError
 from tussock.world.geometry import Bounds
+from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
 
 from ..poses import Poses
@@ -96,7 +96,7 @@ def write_database(
     folder: str | os.PathLike,
     renderer: Renderer,
     poses: Poses | Grid,
-    progress: Callable[[int, int], object] = lambda done, total: None,
+    progress: Progress = no_progress,
 ) -> tuple[Database, int]:
     """Draw the views at the poses of a route, or of a grid, into a folder.
 
@@ -216,7 +216,7 @@ def _draw(
     poses: Float[np.ndarray, "n 3"],
     columns: Columns,
     missing: list[int],
-    progress: Callable[[int, int], object],
+    progress: Progress,
 ) -> None:
     """Draw the images of the missing rows. The entries list each batch when all of its images are saved."""
     done = np.ones(len(poses), dtype=bool)

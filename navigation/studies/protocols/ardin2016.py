@@ -6,14 +6,15 @@ from tussock.render.eye import Eye
 
 from ...body import Body
 from ...experiment import Experiment
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
-from .figures import boxes_by_model, lines_by_model
+from .figures import boxes, lines_by_model
 from .protocol import Item, Parameter, Protocol, models_in
 
 PERFECT, BODY, INFOMAX, RANDOM = "perfect-memory", "mushroom-body", "infomax", "random"
+NOTE = "Published as box plots only (figure 4D)."
 MODELS = (PERFECT, f"{BODY} inputs=10 cells=20000", f"{INFOMAX} rate=unit-range", RANDOM)
 
 
@@ -57,51 +58,36 @@ def _errors(results: StudyResults, *models: str) -> dict[str, float]:
     return {f"errors a walk, {model}": results.numbers[f"errors, {model}"] for model in models}
 
 
+@claim("random-worst", "by-displacement", "each of the others makes fewer errors per walk than random", note=NOTE)
 def _random_worst(results: StudyResults) -> Decision:
+    """All three memories make fewer errors than a random choice of direction."""
     obtained = _errors(results, PERFECT, BODY, INFOMAX, RANDOM)
     *others, random = obtained.values()
     return Decision(obtained, max(others) < random)
 
 
+@claim("perfect-best", "by-model", "no other model makes fewer errors per walk", note=NOTE)
 def _perfect_best(results: StudyResults) -> Decision:
+    """Perfect memory, which stores every view, makes the fewest errors."""
     obtained = _errors(results, PERFECT, BODY, INFOMAX)
     perfect, *others = (*obtained.values(), results.numbers[f"errors, {RANDOM}"])
     return Decision(obtained, perfect <= min(others))
 
 
+@claim(
+    "body-close",
+    "by-model",
+    "its errors lie in the first tenth of the way from perfect memory's to random's",
+    note=NOTE,
+)
 def _body_close(results: StudyResults) -> Decision:
+    """The mushroom body follows routes nearly as well as perfect memory."""
     perfect, body, random = _errors(results, PERFECT, BODY, RANDOM).values()
     share = (body - perfect) / (random - perfect) if random != perfect else float("nan")
     return Decision({"share of the way from perfect memory to random": share}, share <= 0.1)
 
 
-NOTE = "Published as box plots only (figure 4D)."
-CLAIMS = (
-    Claim(
-        key="random-worst",
-        statement="All three memories make fewer errors than a random choice of direction.",
-        figure="by-displacement",
-        test="each of the others makes fewer errors per walk than random",
-        decide=_random_worst,
-        note=NOTE,
-    ),
-    Claim(
-        key="perfect-best",
-        statement="Perfect memory, which stores every view, makes the fewest errors.",
-        figure="by-model",
-        test="no other model makes fewer errors per walk",
-        decide=_perfect_best,
-        note=NOTE,
-    ),
-    Claim(
-        key="body-close",
-        statement="The mushroom body follows routes nearly as well as perfect memory.",
-        figure="by-model",
-        test="its errors lie in the first tenth of the way from perfect memory's to random's",
-        decide=_body_close,
-        note=NOTE,
-    ),
-)
+CLAIMS = (_random_worst, _perfect_best, _body_close)
 
 PARAMETERS = (
     Parameter("Routes", "15 of about 8 m in the Sussex world", "those given, or 15 generated ones of 8 m"),
@@ -144,40 +130,29 @@ DIFFERENCES = (
 
 ITEMS = (
     Item(
-        name="by-displacement",
-        title="Errors by displacement",
-        table="by_displacement",
-        caption="Mean errors per walk over all routes and both sides, by the displacement of the start from the route.",
+        "by-displacement",
+        "Errors by displacement",
+        "by_displacement",
+        "Mean errors per walk over all routes and both sides, by the displacement of the start from the route.",
     ),
     Item(
-        name="errors",
-        title="Errors against displacement",
-        table="walks",
-        caption="Mean errors per walk; bars are standard errors of the mean.",
-        draw=lambda walks: lines_by_model(
+        "errors",
+        "Errors against displacement",
+        "walks",
+        "Mean errors per walk; bars are standard errors of the mean.",
+        lambda walks: lines_by_model(
             walks, "displacement_cm", "errors", "displacement of the start (cm)", "errors per walk"
         ),
     ),
     Item(
-        name="by-model",
-        title="Errors of all walks",
-        table="by_model",
-        caption="Over all routes and displacements. Arrived: share of the walks that arrived within 1,000 steps; the other walks "
+        "by-model",
+        "Errors of all walks",
+        "by_model",
+        "Over all routes and displacements. Arrived: share of the walks that arrived within 1,000 steps; the other walks "
         "count with the errors that they had made by then.",
     ),
-    Item(
-        name="boxes",
-        title="Errors of each model, as in figure 4D of the paper",
-        table="walks",
-        caption="Median, quartiles, lowest and highest of all walks.",
-        draw=lambda walks: boxes_by_model(walks, "errors", "errors per walk"),
-    ),
-    Item(
-        name="by-route",
-        title="Errors by route",
-        table="by_route",
-        caption="Mean errors per walk, over all displacements.",
-    ),
+    boxes("boxes", "Errors of each model, as in figure 4D of the paper", "errors", "errors per walk"),
+    Item("by-route", "Errors by route", "by_route", "Mean errors per walk, over all displacements."),
 )
 
 ARDIN2016 = Protocol(

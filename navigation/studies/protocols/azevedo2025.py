@@ -9,7 +9,7 @@ from tussock.render.eye import Eye
 
 from ...body import Body
 from ...experiment import Experiment
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
@@ -59,7 +59,15 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     )
 
 
+@claim(
+    "no-approach",
+    "displacement",
+    f"the rank correlation of mean displacement with that of the start is at least {MIN_RANK:g}",
+    note="Published as curves only (figure 2, A and D: view based orientation).",
+)
 def _no_approach(results: StudyResults) -> Decision:
+    """Turning to the most familiar view does not by itself lead back to the route: the farther from the route an agent starts, the
+    farther from it the agent walks."""
     ranks = results.tables["by_start"][["start beside the route (m)", "mean displacement (m)"]].rank()
     rank = float(ranks.corr().iloc[0, 1]) if len(ranks) > 1 else np.nan
     obtained = {"rank correlation of displacement and that of the start": rank} | results.numbers
@@ -71,17 +79,7 @@ def _starts(count: int) -> list[float]:
     return [round(each, 6) for each in np.linspace(-MAX_START, MAX_START, count).tolist()]
 
 
-CLAIMS = (
-    Claim(
-        key="no-approach",
-        statement="Turning to the most familiar view does not by itself lead back to the route: the farther from the route an agent "
-        "starts, the farther from it the agent walks.",
-        figure="displacement",
-        test=f"the rank correlation of mean displacement with that of the start is at least {MIN_RANK:g}",
-        decide=_no_approach,
-        note="Published as curves only (figure 2, A and D: view based orientation).",
-    ),
-)
+CLAIMS = (_no_approach,)
 
 PARAMETERS = (
     Parameter("Route", "20 m", "20 m"),
@@ -114,20 +112,20 @@ def _displacements(walks: pd.DataFrame, column: str) -> Any:
 
 ITEMS = (
     Item(
-        name="displacement",
-        title="Displacement against that of the start",
-        table="walks",
-        caption="Mean distance from the route, over all worlds and both sides; bars are standard errors of the mean.",
-        draw=lambda walks: _displacements(walks, "displacement_m"),
+        "displacement",
+        "Displacement against that of the start",
+        "walks",
+        "Mean distance from the route, over all worlds and both sides; bars are standard errors of the mean.",
+        lambda walks: _displacements(walks, "displacement_m"),
     ),
     Item(
-        name="last",
-        title="Displacement over the last 5 % of the route",
-        table="walks",
-        caption="As above, of the walks that got there.",
-        draw=lambda walks: _displacements(walks, "last_displacement_m"),
+        "last",
+        "Displacement over the last 5 % of the route",
+        "walks",
+        "As above, of the walks that got there.",
+        lambda walks: _displacements(walks, "last_displacement_m"),
     ),
-    Item(name="by-start", title="Displacement by start", table="by_start", caption="Over all worlds and both sides."),
+    Item("by-start", "Displacement by start", "by_start", "Over all worlds and both sides."),
 )
 
 AZEVEDO2025 = Protocol(

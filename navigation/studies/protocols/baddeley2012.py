@@ -8,16 +8,18 @@ from tussock.render.eye import Eye
 
 from ...body import Body
 from ...experiment import Experiment
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
-from .figures import boxes_by_model
+from .figures import boxes, boxes_by_model
 from .protocol import Item, Parameter, Protocol
 
 PERFECT, INFOMAX, RANDOM = "perfect-memory", "infomax", "random"
 MODELS = (PERFECT, f"{INFOMAX} rate=baddeley", RANDOM)
 MOSTLY = 0.9  # of the walks
+FOLLOWS = f"at least {100 * MOSTLY:g} % of its walks arrive without an error"
+NOTE = "Published as figures of paths."
 
 
 def measure(walks: pd.DataFrame) -> StudyResults:
@@ -51,40 +53,32 @@ def _follows(results: StudyResults, model: str) -> Decision:
     return Decision({"walks that arrive without an error": share}, share >= MOSTLY)
 
 
+@claim(
+    "infomax-better-than-chance",
+    "by-model",
+    "Infomax makes less than half as many errors as random headings",
+    note="Random headings are a control of ours.",
+)
 def _better_than_chance(results: StudyResults) -> Decision:
+    """The network has learned the route: it does much better than chance."""
     infomax, random = (float(results.numbers[f"errors a walk, {model}"]) for model in (INFOMAX, RANDOM))
     obtained = {f"errors a walk, {INFOMAX}": infomax, f"errors a walk, {RANDOM}": random}
     return Decision(obtained, infomax < random / 2)
 
 
-FOLLOWS = f"at least {100 * MOSTLY:g} % of its walks arrive without an error"
-NOTE = "Published as figures of paths."
-CLAIMS = (
-    Claim(
-        key="perfect-memory-follows",
-        statement="Routes can be followed by comparing the view with all views of the route.",
-        figure="by-model",
-        test=FOLLOWS,
-        decide=lambda results: _follows(results, PERFECT),
-        note=NOTE,
-    ),
-    Claim(
-        key="infomax-follows",
-        statement="They can be followed as well by a network that has seen each view once and stores none.",
-        figure="by-model",
-        test=FOLLOWS,
-        decide=lambda results: _follows(results, INFOMAX),
-        note=NOTE,
-    ),
-    Claim(
-        key="infomax-better-than-chance",
-        statement="The network has learned the route: it does much better than chance.",
-        figure="by-model",
-        test="Infomax makes less than half as many errors as random headings",
-        decide=_better_than_chance,
-        note="Random headings are a control of ours.",
-    ),
-)
+@claim("perfect-memory-follows", "by-model", FOLLOWS, note=NOTE)
+def _perfect_memory_follows(results: StudyResults) -> Decision:
+    """Routes can be followed by comparing the view with all views of the route."""
+    return _follows(results, PERFECT)
+
+
+@claim("infomax-follows", "by-model", FOLLOWS, note=NOTE)
+def _infomax_follows(results: StudyResults) -> Decision:
+    """They can be followed as well by a network that has seen each view once and stores none."""
+    return _follows(results, INFOMAX)
+
+
+CLAIMS = (_perfect_memory_follows, _infomax_follows, _better_than_chance)
 
 PARAMETERS = (
     Parameter(
@@ -109,27 +103,16 @@ DIFFERENCES = (
 )
 
 ITEMS = (
+    Item("by-model", "Routes followed", "by_model", "Over all routes and starts; shares are of 1."),
+    boxes("errors", "Errors of each model", "errors", "errors per walk"),
     Item(
-        name="by-model",
-        title="Routes followed",
-        table="by_model",
-        caption="Over all routes and starts; shares are of 1.",
+        "deviation",
+        "Distance from the route",
+        "walks",
+        "Mean over each walk; median, quartiles, lowest and highest of all walks.",
+        lambda walks: boxes_by_model(walks, "deviation_cm", "mean deviation (cm)"),
     ),
-    Item(
-        name="errors",
-        title="Errors of each model",
-        table="walks",
-        caption="Median, quartiles, lowest and highest of all walks.",
-        draw=lambda walks: boxes_by_model(walks, "errors", "errors per walk"),
-    ),
-    Item(
-        name="deviation",
-        title="Distance from the route",
-        table="walks",
-        caption="Mean over each walk; median, quartiles, lowest and highest of all walks.",
-        draw=lambda walks: boxes_by_model(walks, "deviation_cm", "mean deviation (cm)"),
-    ),
-    Item(name="by-route", title="Errors by route", table="by_route", caption="Mean errors per walk, over all starts."),
+    Item("by-route", "Errors by route", "by_route", "Mean errors per walk, over all starts."),
 )
 
 BADDELEY2012 = Protocol(
@@ -147,10 +130,7 @@ BADDELEY2012 = Protocol(
         body=Body(step_length=0.04),
         stopping=StoppingRules(max_deviation=0.5, put_back=True, waypoint_spacing=0.1),
     ),
-    axes={
-        "model": MODELS,
-        "start_offset": [-0.1, 0.0, 0.1],
-    },
+    axes={"model": MODELS, "start_offset": [-0.1, 0.0, 0.1]},
     worlds=10,
     quick_worlds=2,
     quick_axes={"start_offset": [0.0]},

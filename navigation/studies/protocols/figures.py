@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from ...reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, canvas
-from .protocol import models_in
+from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
 MARKERS = "osD^v"
@@ -30,17 +30,8 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
     for model, colour, marker in zip(models_in(walks), COLOURS, MARKERS, strict=False):
         grouped = walks[walks["model"] == model].groupby(x)[y]
         mean, error = grouped.mean().astype(float), grouped.sem().fillna(0).astype(float)
-        axis.errorbar(
-            mean.index.to_numpy(float),
-            mean,
-            yerr=error,
-            fmt=f"-{marker}",
-            color=colour,
-            label=model,
-            ms=5,
-            lw=1.6,
-            capsize=2,
-        )
+        style = {"fmt": f"-{marker}", "color": colour, "label": model}
+        axis.errorbar(mean.index.to_numpy(float), mean, yerr=error, ms=5, lw=1.6, capsize=2, **style)
     if diagonal:
         ends = np.array([0.0, walks[x].max()])
         axis.plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")
@@ -72,3 +63,9 @@ def boxes_by_model(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
     axis.set_ylim(bottom=0)
     axis.grid(axis="y", color="#00000018")
     return figure
+
+
+def boxes(name: str, title: str, y: str, ylabel: str, *, of: str = "walks") -> Item:
+    """The figure that `boxes_by_model` draws of a column of the table of walks. of: What there is one of in each row."""
+    caption = f"Median, quartiles, lowest and highest of all {of}."
+    return Item(name, title, "walks", caption, lambda walks: boxes_by_model(walks, y, ylabel))

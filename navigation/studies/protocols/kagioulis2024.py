@@ -6,16 +6,17 @@ from tussock.render.eye import Eye
 
 from ...body import Body
 from ...experiment import Experiment
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
-from .figures import boxes_by_model
+from .figures import boxes
 from .protocol import Item, Parameter, Protocol
 
 PERFECT, CHAIN = "perfect-memory", "chain"
 SPACING = 0.05  # m, between learned views
 ANGULAR_ERROR, FAIL_COUNT = "mean absolute angular error", "trial-fail count"
+NOTE = "We have no numbers of the original."
 
 
 def measure(walks: pd.DataFrame) -> StudyResults:
@@ -50,25 +51,24 @@ def _chain_lower(results: StudyResults, number: str, label: str) -> Decision:
     return Decision({f"{label}, {PERFECT}": perfect, f"{label}, {CHAIN}": chain}, chain < perfect)
 
 
-NOTE = "We have no numbers of the original."
-CLAIMS = (
-    Claim(
-        key="sequence-lowers-error",
-        statement="Headings are more accurate when the view is compared only with views that are near in the sequence.",
-        figure="by-model",
-        test="the chain's mean absolute angular error is lower than perfect memory's",
-        decide=lambda results: _chain_lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)"),
-        note=NOTE,
-    ),
-    Claim(
-        key="sequence-fails-less",
-        statement="There are fewer failures.",
-        figure="by-model",
-        test="the chain has fewer failures per route than perfect memory",
-        decide=lambda results: _chain_lower(results, FAIL_COUNT, "failures a route"),
-        note=NOTE,
-    ),
+@claim(
+    "sequence-lowers-error",
+    "by-model",
+    "the chain's mean absolute angular error is lower than perfect memory's",
+    note=NOTE,
 )
+def _sequence_lowers_error(results: StudyResults) -> Decision:
+    """Headings are more accurate when the view is compared only with views that are near in the sequence."""
+    return _chain_lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)")
+
+
+@claim("sequence-fails-less", "by-model", "the chain has fewer failures per route than perfect memory", note=NOTE)
+def _sequence_fails_less(results: StudyResults) -> Decision:
+    """There are fewer failures."""
+    return _chain_lower(results, FAIL_COUNT, "failures a route")
+
+
+CLAIMS = (_sequence_lowers_error, _sequence_fails_less)
 
 PARAMETERS = (
     Parameter("Routes", "20", "those given, or 20 generated ones of 8 m"),
@@ -98,27 +98,17 @@ DIFFERENCES = (
 
 ITEMS = (
     Item(
-        name="by-model",
-        title="Errors and failures",
-        table="by_model",
-        caption="Over all routes. Angular error: between the chosen heading and the route's heading at the nearest position, mean over the "
+        "by-model",
+        "Errors and failures",
+        "by_model",
+        "Over all routes. Angular error: between the chosen heading and the route's heading at the nearest position, mean over the "
         "steps of a walk. Trial-fail count: how often a walk was put back.",
     ),
-    Item(
-        name="angular-error",
-        title="Mean absolute angular error",
-        table="walks",
-        caption="Median, quartiles, lowest and highest of all routes.",
-        draw=lambda walks: boxes_by_model(walks, "mean_error_deg", "mean absolute error (degrees)"),
+    boxes(
+        "angular-error", "Mean absolute angular error", "mean_error_deg", "mean absolute error (degrees)", of="routes"
     ),
-    Item(
-        name="failures",
-        title="Failures",
-        table="walks",
-        caption="Median, quartiles, lowest and highest of all routes.",
-        draw=lambda walks: boxes_by_model(walks, "failures", "failures per route"),
-    ),
-    Item(name="by-route", title="Route by route", table="by_route", caption="One walk per model and route."),
+    boxes("failures", "Failures", "failures", "failures per route", of="routes"),
+    Item("by-route", "Route by route", "by_route", "One walk per model and route."),
 )
 
 KAGIOULIS2024 = Protocol(

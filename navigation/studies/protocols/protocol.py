@@ -33,22 +33,22 @@ class Parameter(NamedTuple):
     here: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Item:
     """A figure or table of the report.
 
     Attributes:
         name: Name of its files and of its anchor in the page.
         title: Heading.
-        caption: Text below a figure or above a table.
         table: Name of a table of the results.
+        caption: Text below a figure or above a table.
         draw: Draws a figure of that table; without it, the item is the table.
     """
 
     name: str
     title: str
-    caption: str
     table: str
+    caption: str
     draw: Callable[[pd.DataFrame], Figure] | None = None
 
 

@@ -44,8 +44,7 @@ def replicate(
     *,
     about: dict[str, Any],
     command: str,
-    scheduler: str | None = None,
-    workers: int | None = None,
+    workers: str | int | None = None,
     progress: Progress = no_progress,
 ) -> dict[str, Any]:
     """Do the runs that a folder does not have yet, and write the report.
@@ -56,8 +55,7 @@ def replicate(
         out: The folder.
         about: The choices made, for the head of the report.
         command: Command line that repeats all of it.
-        scheduler: Address of a Dask scheduler; see `run_sweep`.
-        workers: Number of workers on this machine; see `run_sweep`.
+        workers: What does the runs; see `run_sweep`.
         progress: Called with the numbers of finished and of all runs.
 
     Returns:
@@ -67,7 +65,7 @@ def replicate(
         SettingError: A model has no walk at all.
         InputError: For the same reasons as `run_sweep`.
     """
-    done = run_sweep(sweep, out, scheduler=scheduler, workers=workers, progress=progress)
+    done = run_sweep(sweep, out, workers=workers, progress=progress)
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
     outcomes = check_claims(protocol.claims, [results])

@@ -11,18 +11,18 @@ from sklearn.metrics import classification_report
 from tussock.world.geometry import turn_of_columns
 
 from ...models import MLP, make_model
-from ...models.base import Images
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from . import published
 from .grid_search import best_tuning, count_best, count_tunings, search, share_of
 from .headings import errors_of, headings
-from .parameters import ENCODING, EVERY, Progress, StudySettings
+from .parameters import EVERY, Progress, StudySettings
 from .study_data import StudyData
 
 FIRST = 20  # training views of the first part of the route (4.4.5)
 PARTS = {"first_20": "first 20 views", "whole_route": "whole route"}
 CLASSES = {"0": "0, off the route", "1": "1, on the route", "weighted avg": "average"}
+MEDIANS_DEG = published.CLASSIFIER_MEDIAN_DEG
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,19 +44,18 @@ class TrainedNetworks:
 
 def study(data: StudyData, settings: StudySettings, progress: Progress) -> StudyResults:
     """Tune, train and test the classifier on the first views and on the whole route; compare with perfect memory."""
-    route_images, grid_images = ENCODING(data.route_views), ENCODING(data.grid_views)
-    one = _one_view(data, route_images, grid_images)
+    one = _one_view(data)
     tables: dict[str, pd.DataFrame] = {"training": _uses_of_views(data), "one_place": one}
     numbers: dict[str, Any] = {"one_place_error_deg": float(one["error_deg"].iloc[0])}
     total, before = sum(count_tunings(part, settings) for part in PARTS), 0
     for part in PARTS:
         learned, rows = _views_of_part(data, part)
         tuned = search(
-            part, route_images[learned], settings, lambda done, _, before=before: progress(before + done, total)
+            part, data.route_images[learned], settings, lambda done, _, before=before: progress(before + done, total)
         )
         before += len(tuned)
-        networks = train_networks(data, route_images, grid_images, learned, rows, best_tuning(tuned), settings)
-        memory = headings(data, make_model("perfect-memory").fit(route_images[learned]), grid_images, rows)
+        networks = train_networks(data, learned, rows, best_tuning(tuned), settings)
+        memory = headings(data, make_model("perfect-memory").fit(data.route_images[learned]), data.grid_images, rows)
         results = _results_of_part(len(learned), tuned, networks, memory)
         tables |= {f"{name}_{part}": table for name, table in results.tables.items()}
         numbers |= {f"{name}_{part}": number for name, number in results.numbers.items()}
@@ -108,20 +107,12 @@ def _views_of_part(data: StudyData, part: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def train_networks(
-    data: StudyData,
-    route_images: Images,
-    grid_images: Images,
-    learned: np.ndarray,
-    rows: np.ndarray,
-    tuning: dict[str, Any],
-    settings: StudySettings,
+    data: StudyData, learned: np.ndarray, rows: np.ndarray, tuning: dict[str, Any], settings: StudySettings
 ) -> TrainedNetworks:
     """Train networks from different random starts, and test each on held-out views and on headings.
 
     Args:
         data: The views.
-        route_images: All route views, encoded.
-        grid_images: All grid views, encoded.
         learned: Indices of the route views to learn.
         rows: Indices of the grid poses where headings are recovered.
         tuning: Parameters of the network.
@@ -133,10 +124,10 @@ def train_networks(
     held_out = held_out_views(learned)
     rows_of_table, reports, tables = [], [], []
     for seed in settings.seeds:
-        network = MLP(**tuning, max_iter=settings.iterations[1], seed=seed).fit(route_images[learned])
-        images, labels = network.training_data(route_images[held_out])
+        network = MLP(**tuning, max_iter=settings.iterations[1], seed=seed).fit(data.route_images[learned])
+        images, labels = network.training_data(data.route_images[held_out])
         truth, guess = labels.numpy().astype(int), network.predict(images)
-        tables.append(headings(data, network, grid_images, rows))
+        tables.append(headings(data, network, data.grid_images, rows))
         reports.append(_report(truth, guess))
         rows_of_table.append({"seed": seed, "accuracy": float((guess == truth).mean())} | errors_of(tables[-1]))
     table = pd.DataFrame(rows_of_table)
@@ -162,14 +153,14 @@ def _uses_of_views(data: StudyData) -> pd.DataFrame:
     return pd.DataFrame({"x_m": x, "y_m": y, "heading_deg": np.degrees(heading), "use": use})
 
 
-def _one_view(data: StudyData, route_images: Images, grid_images: Images) -> pd.DataFrame:
+def _one_view(data: StudyData) -> pd.DataFrame:
     """Confidence at every rotation of the grid view nearest to a route view, when only that route view is learned (figures 21, 22)."""
     distance = np.hypot(*(data.poses[:, :2] - data.route.xy[data.nearest]).T)
     row = int(distance.argmin())
-    network = MLP(max_iter=600).fit(route_images[data.nearest[row]][None])
-    confidence = expit(network.scan(grid_images[row : row + 1]).double().numpy()[0])
+    network = MLP(max_iter=600).fit(data.route_images[data.nearest[row]][None])
+    confidence = expit(network.scan(data.grid_images[row : row + 1]).double().numpy()[0])
     turns = np.degrees(turn_of_columns(np.arange(len(confidence)), len(confidence))) % 360
-    recovered = headings(data, network, grid_images, [row]).iloc[0]
+    recovered = headings(data, network, data.grid_images, [row]).iloc[0]
     return pd.DataFrame({"turn_deg": turns, "confidence": confidence}).assign(**recovered)
 
 
@@ -179,24 +170,54 @@ def best_tuning_of(results: StudyResults) -> dict[str, Any]:
     return tuning | {"hidden_layer_sizes": tuple(tuning["hidden_layer_sizes"])}
 
 
+@claim(
+    "classifier-accurate",
+    "24",
+    "both accuracies are 0.9 or more",
+    published={f"accuracy, {label}": published.HELD_OUT_ACCURACY[part] for part, label in PARTS.items()},
+)
 def _accuracies(results: StudyResults) -> Decision:
+    """The classifier is nearly perfect on held-out views, both of the first part and of the whole route."""
     accuracies = {f"accuracy, {label}": results.numbers[f"accuracy_{part}"] for part, label in PARTS.items()}
     return Decision(accuracies, min(accuracies.values()) >= 0.9)
 
 
+@claim(
+    "few-views-work",
+    "25",
+    "the median error is under 10 degrees",
+    published={"median error (deg)": MEDIANS_DEG["first_20"]},
+)
 def _few_views(results: StudyResults) -> Decision:
+    """After learning 20 views, the classifier recovers headings."""
     median = results.numbers["median_error_deg_first_20"]
     return Decision({"median error (deg)": median}, median < 10)
 
 
+@claim(
+    "whole-route-fails",
+    "27",
+    "the median error is over 20 degrees, and at least twice that of the first 20 views",
+    published={
+        "median error, whole route (deg)": MEDIANS_DEG["whole_route"],
+        "over that of the first 20 views": MEDIANS_DEG["whole_route"] / MEDIANS_DEG["first_20"],
+    },
+)
 def _whole_route(results: StudyResults) -> Decision:
+    """After learning the whole route it does not, although it is accurate on held-out views."""
     few, whole = (results.numbers[f"median_error_deg_{part}"] for part in PARTS)
     long_enough = results.numbers["learned_whole_route"] >= 2 * FIRST
     obtained = {"median error, whole route (deg)": whole, "over that of the first 20 views": whole / few}
     return Decision(obtained, whole > 20 and whole >= 2 * few if long_enough else None)
 
 
+@claim(
+    "perfect-memory-beside",
+    "28",
+    "its median error is under half of the classifier's, and a smaller share of its errors is over 45 degrees",
+)
 def _perfect_memory(results: StudyResults) -> Decision:
+    """Perfect memory of the same views recovers the headings that the classifier does not."""
     memory = errors_of(results.tables["perfect_memory_whole_route"])
     median, share = (results.numbers[f"{name}_whole_route"] for name in ("median_error_deg", "share_over_45"))
     obtained = {
@@ -208,14 +229,28 @@ def _perfect_memory(results: StudyResults) -> Decision:
     return Decision(obtained, memory["median_error_deg"] < median / 2 and memory["share_over_45"] < share)
 
 
+@claim(
+    "lbfgs-for-few",
+    "7.4",
+    "at least four in five use it, of the tunings that score no less than the fifth best",
+    published={"share of lbfgs in the best five": 1.0},
+)
 def _lbfgs(results: StudyResults) -> Decision:
+    """With few views, lbfgs is the best solver."""
     searched = results.tables["search_first_20"]
     share = share_of("lbfgs", searched, 5)
     best = float(count_best(searched))
     return Decision({"share of lbfgs in the best five": share, "tunings with the best score": best}, share >= 0.8)
 
 
+@claim(
+    "adam-for-the-route",
+    "7.5",
+    "half or more of the tunings with the best score use it",
+    published={"best validation score": published.BEST_TUNINGS["whole_route"][0], "share of adam in the best": 1.0},
+)
 def _adam(results: StudyResults) -> Decision:
+    """With the whole route, the best tuning uses adam."""
     searched = results.tables["search_whole_route"]
     share = share_of("adam", searched, 1)
     obtained = {
@@ -226,56 +261,4 @@ def _adam(results: StudyResults) -> Decision:
     return Decision(obtained, share >= 0.5)
 
 
-MEDIANS_DEG = published.CLASSIFIER_MEDIAN_DEG
-CLAIMS = (
-    Claim(
-        key="classifier-accurate",
-        figure="24",
-        statement="The classifier is nearly perfect on held-out views, both of the first part and of the whole route.",
-        test="both accuracies are 0.9 or more",
-        published={f"accuracy, {label}": published.HELD_OUT_ACCURACY[part] for part, label in PARTS.items()},
-        decide=_accuracies,
-    ),
-    Claim(
-        key="few-views-work",
-        figure="25",
-        statement="After learning 20 views, the classifier recovers headings.",
-        test="the median error is under 10 degrees",
-        published={"median error (deg)": MEDIANS_DEG["first_20"]},
-        decide=_few_views,
-    ),
-    Claim(
-        key="whole-route-fails",
-        figure="27",
-        statement="After learning the whole route it does not, although it is accurate on held-out views.",
-        test="the median error is over 20 degrees, and at least twice that of the first 20 views",
-        published={
-            "median error, whole route (deg)": MEDIANS_DEG["whole_route"],
-            "over that of the first 20 views": MEDIANS_DEG["whole_route"] / MEDIANS_DEG["first_20"],
-        },
-        decide=_whole_route,
-    ),
-    Claim(
-        key="perfect-memory-beside",
-        figure="28",
-        statement="Perfect memory of the same views recovers the headings that the classifier does not.",
-        test="its median error is under half of the classifier's, and a smaller share of its errors is over 45 degrees",
-        decide=_perfect_memory,
-    ),
-    Claim(
-        key="lbfgs-for-few",
-        figure="7.4",
-        statement="With few views, lbfgs is the best solver.",
-        test="at least four in five use it, of the tunings that score no less than the fifth best",
-        published={"share of lbfgs in the best five": 1.0},
-        decide=_lbfgs,
-    ),
-    Claim(
-        key="adam-for-the-route",
-        figure="7.5",
-        statement="With the whole route, the best tuning uses adam.",
-        test="half or more of the tunings with the best score use it",
-        published={"best validation score": published.BEST_TUNINGS["whole_route"][0], "share of adam in the best": 1.0},
-        decide=_adam,
-    ),
-)
+CLAIMS = (_accuracies, _few_views, _whole_route, _perfect_memory, _lbfgs, _adam)

@@ -10,14 +10,13 @@ from tussock.world.geometry import wrap_angle
 
 from ...evaluation import RECOVERED_DEG
 from ...models import MLP
-from ...models.base import Images
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from . import published
 from .classifier import learned_views
 from .corners import corner_views
 from .headings import errors_of, headings, relative_to_set_heading
-from .parameters import ENCODING, Progress, StudySettings
+from .parameters import Progress, StudySettings
 from .study_data import StudyData
 
 SCANS_DEG = (360, 180, 90)
@@ -27,18 +26,17 @@ HIGH = 0.9  # of the range between a scan's lowest and highest confidence
 
 def study(data: StudyData, settings: StudySettings, progress: Progress) -> StudyResults:
     """The thesis's network of the whole route after a short and a long training, with full and narrow scans."""
-    route_images, grid_images = ENCODING(data.route_views), ENCODING(data.grid_views)
     learned, tuning = learned_views(data), published.BEST_TUNINGS["whole_route"][2]
     rows, networks, tables = [], {}, {}
     runs = [(iterations, seed) for iterations in settings.iterations for seed in settings.seeds]
     for done, (iterations, seed) in enumerate(runs):
-        network = MLP(**tuning, max_iter=iterations, seed=seed).fit(route_images[learned])
+        network = MLP(**tuning, max_iter=iterations, seed=seed).fit(data.route_images[learned])
         for scan in SCANS_DEG:
-            table = headings(data, network, grid_images, scan_deg=scan)
+            table = headings(data, network, data.grid_images, scan_deg=scan)
             rows.append(
                 {"iterations": iterations, "seed": seed, "scan_deg": scan}
                 | errors_of(table)
-                | {"high_share": _high_share(network, grid_images, data.near), "reversed_share": _reversed_share(table)}
+                | {"high_share": _high_share(network, data), "reversed_share": _reversed_share(table)}
             )
             tables[iterations, seed, scan] = table
         networks[iterations, seed] = network
@@ -48,7 +46,7 @@ def study(data: StudyData, settings: StudySettings, progress: Progress) -> Study
     seed = _middle_seed(results, long)
     recovered, reversed_ = _examples(data, tables[long, seed, 360])
     curves = [
-        _curve(networks[iterations, seed], grid_images, data, row).assign(iterations=iterations, place=name)
+        _curve(networks[iterations, seed], data, row).assign(iterations=iterations, place=name)
         for iterations in settings.iterations
         for name, row in (("recovered", recovered), ("reversed", reversed_))
     ]
@@ -66,15 +64,15 @@ def study(data: StudyData, settings: StudySettings, progress: Progress) -> Study
     )
 
 
-def _curve(network: MLP, images: Images, data: StudyData, row: int) -> pd.DataFrame:
+def _curve(network: MLP, data: StudyData, row: int) -> pd.DataFrame:
     """Confidence at every rotation of a grid view."""
-    confidence = expit(network.scan(images[row : row + 1]).double().cpu().numpy()[0])
+    confidence = expit(network.scan(data.grid_images[row : row + 1]).double().cpu().numpy()[0])
     return relative_to_set_heading(confidence, data.poses[row, 2], data.set_headings[row], name="confidence")
 
 
-def _high_share(network: MLP, images: Images, rows: np.ndarray) -> float:
+def _high_share(network: MLP, data: StudyData) -> float:
     """Median share of rotations with a confidence close to the highest of their scan: how broad its top is."""
-    confidence = expit(network.scan(images[rows]).double().cpu().numpy())
+    confidence = expit(network.scan(data.grid_images[data.near]).double().cpu().numpy())
     low, high = confidence.min(axis=1, keepdims=True), confidence.max(axis=1, keepdims=True)
     return float(np.median((confidence >= low + HIGH * (high - low)).mean(axis=1)))
 
@@ -115,24 +113,56 @@ def _medians(results: StudyResults, column: str) -> dict[tuple[int, int], float]
     return {key: float(value) for key, value in medians.items()}  # type: ignore[misc]
 
 
+@claim(
+    "longer-training-helps",
+    "34",
+    "the median error is lower after the longer training",
+    published={f"median error, {n:,} iterations (deg)": published.ITERATIONS_MEDIAN_DEG[n] for n in (600, 3000)},
+)
 def _longer_helps(results: StudyResults) -> Decision:
+    """3,000 iterations recover more headings than 600."""
     median, (short, long) = _medians(results, "median_error_deg"), results.numbers["iterations"]
     obtained = {f"median error, {n:,} iterations (deg)": median[n, 360] for n in (short, long)}
     return Decision(obtained, median[long, 360] < median[short, 360])
 
 
+@claim(
+    "longer-training-broadens",
+    "33",
+    "the share of rotations in the upper tenth of a scan's range is larger after the longer training",
+)
 def _longer_broadens(results: StudyResults) -> Decision:
+    """Longer training spreads high confidence over more rotations."""
     broad, (short, long) = _medians(results, "high_share"), results.numbers["iterations"]
     obtained = {f"share of rotations near the top, {n:,} iterations": broad[n, 360] for n in (short, long)}
     return Decision(obtained, broad[long, 360] > broad[short, 360])
 
 
+@claim(
+    "failures-point-backwards",
+    "36",
+    "of the headings over 45 degrees off, more than a third are over 135 degrees off",
+    note="Of random headings, a third would be.",
+)
 def _backwards(results: StudyResults) -> Decision:
+    """Wrong headings point backwards, where the network was not trained."""
     share = _medians(results, "reversed_share")[results.numbers["iterations"][1], 360]
     return Decision({"share of failures over 135 degrees off": share}, None if math.isnan(share) else share > 1 / 3)
 
 
+@claim(
+    "narrower-scans-help",
+    "38",
+    "the median error falls from 360 to 180 to 90 degrees",
+    published={f"median error, {scan} degrees (deg)": published.SCAN_MEDIAN_DEG[scan] for scan in SCANS_DEG}
+    | {"180 degrees, in the conclusion (deg)": published.SCAN_180_IN_CONCLUSION_DEG},
+    note=(
+        "The thesis gives 15 degrees for the scan of 180 degrees in section 4.4.7.2 and 17 in its conclusion. A narrow scan about "
+        "the right direction lowers the error of a random heading as well."
+    ),
+)
 def _narrower_helps(results: StudyResults) -> Decision:
+    """Scans of 180, then 90 degrees about the general direction lower the error."""
     median, long = _medians(results, "median_error_deg"), results.numbers["iterations"][1]
     by_chance = results.tables["chance"].set_index("scan_deg")["median_error_deg"]
     obtained = {f"median error, {scan} degrees (deg)": median[long, scan] for scan in SCANS_DEG}
@@ -141,39 +171,4 @@ def _narrower_helps(results: StudyResults) -> Decision:
     return Decision(obtained, full > half > quarter)
 
 
-CLAIMS = (
-    Claim(
-        key="longer-training-helps",
-        figure="34",
-        statement="3,000 iterations recover more headings than 600.",
-        test="the median error is lower after the longer training",
-        published={f"median error, {n:,} iterations (deg)": published.ITERATIONS_MEDIAN_DEG[n] for n in (600, 3000)},
-        decide=_longer_helps,
-    ),
-    Claim(
-        key="longer-training-broadens",
-        figure="33",
-        statement="Longer training spreads high confidence over more rotations.",
-        test="the share of rotations in the upper tenth of a scan's range is larger after the longer training",
-        decide=_longer_broadens,
-    ),
-    Claim(
-        key="failures-point-backwards",
-        figure="36",
-        statement="Wrong headings point backwards, where the network was not trained.",
-        test="of the headings over 45 degrees off, more than a third are over 135 degrees off",
-        decide=_backwards,
-        note="Of random headings, a third would be.",
-    ),
-    Claim(
-        key="narrower-scans-help",
-        figure="38",
-        statement="Scans of 180, then 90 degrees about the general direction lower the error.",
-        test="the median error falls from 360 to 180 to 90 degrees",
-        published={f"median error, {scan} degrees (deg)": published.SCAN_MEDIAN_DEG[scan] for scan in SCANS_DEG}
-        | {"180 degrees, in the conclusion (deg)": published.SCAN_180_IN_CONCLUSION_DEG},
-        decide=_narrower_helps,
-        note="The thesis gives 15 degrees for the scan of 180 degrees in section 4.4.7.2 and 17 in its conclusion. A narrow scan about "
-        "the right direction lowers the error of a random heading as well.",
-    ),
-)
+CLAIMS = (_longer_helps, _longer_broadens, _backwards, _narrower_helps)

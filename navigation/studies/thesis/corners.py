@@ -13,13 +13,13 @@ from tussock.world.geometry import Route
 from ...encoding import Encoding
 from ...evaluation import RECOVERED_DEG
 from ...failures import CHORD
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from . import published
 from .classifier import TrainedNetworks, learned_views, train_networks
 from .grid_search import best_tuning, search
 from .headings import median_of_medians
-from .parameters import ENCODING, EVERY, Progress, StudySettings
+from .parameters import EVERY, Progress, StudySettings
 from .study_data import StudyData
 
 SHARE = 0.2  # at most this share of the route is corners: the part that turns the most ..
@@ -60,18 +60,17 @@ def corner_section(route: Route) -> tuple[int, int]:
 
 def study(data: StudyData, settings: StudySettings, progress: Progress, *, tuning: dict[str, Any]) -> StudyResults:
     """How fast views change, and how much more views in corners help. tuning: the best one for the whole route."""
-    route_images, grid_images = ENCODING(data.route_views), ENCODING(data.grid_views)
     section = corner_section(data.route)
     selections = _selections(data, section)
     near = data.nearest[data.near]
     where = {"in_corner": np.isin(near, corner_views(data.route)), "in_section": _between(near, section)}
-    tuned = search("more_in_corners", route_images[selections[MORE_IN_CORNERS]], settings, progress)
+    tuned = search("more_in_corners", data.route_images[selections[MORE_IN_CORNERS]], settings, progress)
     runs = [(name, learned, tuning) for name, learned in selections.items()]
     runs.append((f"{MORE_IN_CORNERS}, tuned anew", selections[MORE_IN_CORNERS], best_tuning(tuned)))
     tables: dict[str, pd.DataFrame] = {"change": _change(data), "search": tuned}
     rows = []
     for name, learned, parameters in runs:
-        networks = train_networks(data, route_images, grid_images, learned, data.near, parameters, settings)
+        networks = train_networks(data, learned, data.near, parameters, settings)
         tables[f"headings, {name}"] = networks.headings.assign(**where)
         rows.append({"selection": name, "views": len(learned)} | _numbers_of(networks, **where))
     tables |= {"by_selection": pd.DataFrame(rows), "selections": _table_of_selections(data, selections)}
@@ -158,7 +157,13 @@ def _table_of_selections(data: StudyData, selections: dict[str, np.ndarray]) -> 
     return table.assign(in_corner=np.isin(index, corner_views(data.route)))
 
 
+@claim(
+    "corners-change-faster",
+    "30",
+    "the median difference is larger in corners, and its rank correlation with turning is positive (p < 0.05)",
+)
 def _views_differ(results: StudyResults) -> Decision:
+    """Successive views differ more in corners than on straights."""
     change = results.tables["change"].astype({"rms": "float32"})  # as views are
     rank = spearmanr(change["turning_deg"], change["rms"])
     corner, straight = (float(change.loc[change["in_corner"] == where, "rms"].median()) for where in (True, False))
@@ -171,14 +176,26 @@ def _views_differ(results: StudyResults) -> Decision:
     return Decision(obtained, None if math.isnan(corner) else holds)
 
 
+@claim("worse-in-corners", "32", "the median error is larger at positions near corners")
 def _worse_in_corners(results: StudyResults) -> Decision:
+    """The classifier of the whole route fails in corners more than on straights."""
     every_6th = results.tables["by_selection"].iloc[0]
     corner, straight = (float(every_6th[f"median_error_deg_{part}"]) for part in ("corners", "straights"))
     obtained = {"median error in corners (deg)": corner, "on straights": straight}
     return Decision(obtained, None if math.isnan(corner) else corner > straight)
 
 
+@claim(
+    "more-corner-views-help",
+    "32",
+    "more of the headings in the section are less than 45 degrees off",
+    published={
+        f"share recovered, {EVERY_6TH}": published.RECOVERED_IN_CORNERS[EVERY_6TH],
+        MORE_IN_CORNERS: published.RECOVERED_IN_CORNERS[MORE_IN_CORNERS],
+    },
+)
 def _more_views_help(results: StudyResults) -> Decision:
+    """Twice as many views in the corners recover more headings there."""
     rows = results.tables["by_selection"].iloc[:2]
     share = [float(row.recovered_in_section / max(1, row.places_in_section)) for row in rows.itertuples()]
     testable = int(rows["places_in_section"].iloc[0]) and int(results.tables["change"]["in_corner"].sum())
@@ -186,30 +203,4 @@ def _more_views_help(results: StudyResults) -> Decision:
     return Decision(obtained, share[1] > share[0] if testable else None)
 
 
-CLAIMS = (
-    Claim(
-        key="corners-change-faster",
-        figure="30",
-        statement="Successive views differ more in corners than on straights.",
-        test="the median difference is larger in corners, and its rank correlation with turning is positive (p < 0.05)",
-        decide=_views_differ,
-    ),
-    Claim(
-        key="worse-in-corners",
-        figure="32",
-        statement="The classifier of the whole route fails in corners more than on straights.",
-        test="the median error is larger at positions near corners",
-        decide=_worse_in_corners,
-    ),
-    Claim(
-        key="more-corner-views-help",
-        figure="32",
-        statement="Twice as many views in the corners recover more headings there.",
-        test="more of the headings in the section are less than 45 degrees off",
-        published={
-            f"share recovered, {EVERY_6TH}": published.RECOVERED_IN_CORNERS[EVERY_6TH],
-            MORE_IN_CORNERS: published.RECOVERED_IN_CORNERS[MORE_IN_CORNERS],
-        },
-        decide=_more_views_help,
-    ),
-)
+CLAIMS = (_views_differ, _worse_in_corners, _more_views_help)

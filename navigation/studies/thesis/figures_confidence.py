@@ -100,6 +100,3 @@ def _curves(results: StudyResults, chosen: list[tuple[str, int, str]]) -> Figure
 def _curve(results: StudyResults, position: str, iterations: int) -> pd.DataFrame:
     table = results.tables["curves"]
     return table[(table["place"] == position) & (table["iterations"] == iterations)]
-
-
-FIGURES = (_training_time, _short_and_long, _reversed, _narrow_scans, _left_out, _beyond, _beyond_headings)

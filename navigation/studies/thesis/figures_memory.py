@@ -115,14 +115,3 @@ def _preprocessing(results: StudyResults, data: StudyData) -> Figure:
 
 def _label_errors(axes: Axes, xlabel: str) -> None:
     axes.set(xlabel=xlabel, ylabel="error (degrees)", ylim=(0, 180), yticks=range(0, 181, 45))
-
-
-FIGURES = (
-    _perfect_memory,
-    _place_recognition,
-    _by_frequency,
-    _frequency_boxes,
-    _by_factor,
-    _factor_boxes,
-    _preprocessing,
-)

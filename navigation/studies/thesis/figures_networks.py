@@ -126,16 +126,3 @@ def _before_and_after(results: StudyResults, data: StudyData) -> Figure:
     for axis, (name, table) in zip(axes[0], tables.items(), strict=True):
         draw_heading_map(axis, table, data, name, whole_route=False)
     return drawn
-
-
-FIGURES = (
-    _uses_of_views,
-    _on_and_off,
-    _one_view,
-    _first_20,
-    _whole_route,
-    _section,
-    _change,
-    _more_views,
-    _before_and_after,
-)

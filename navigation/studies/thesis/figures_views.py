@@ -129,6 +129,3 @@ def _error_by_distance(results: StudyResults, data: StudyData) -> Figure:
     axis.set(xlabel="distance from the reference view (m)", ylabel="error (degrees)")
     axis.set(ylim=(-4, 184), yticks=range(0, 181, 45))
     return drawn
-
-
-FIGURES = (_world, _view, _image_differences, _headings_around, _ambiguous, _occluded, _error_by_distance)

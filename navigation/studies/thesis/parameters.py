@@ -1,7 +1,6 @@
 """What all studies have in common: the parameters that the thesis leaves open, and how deep a replication goes."""
 
-from collections.abc import Callable
-
+from tussock.world.progress import Progress as Progress
 from tussock.world.settings import settings, switch, whole
 
 from ...encoding import Encoding
@@ -10,7 +9,6 @@ EVERY = 6  # learn every 6th route view (4.3.3)
 FACTOR = 6  # of resizing (4.3.4)
 SMOOTHING = 1.1  # standard deviation of the Gaussian (pixels of the view), that of OpenCV's 5 x 5 kernel; the thesis does not give it
 ENCODING = Encoding.parse(f"grey | blur {SMOOTHING:g} | sample {FACTOR}")  # sampled as cv2.resize does (4.4.1)
-Progress = Callable[[int, int], object]  # called with how many steps are done, and how many there are
 
 
 @settings

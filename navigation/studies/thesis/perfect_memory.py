@@ -6,7 +6,7 @@ from scipy.stats import spearmanr
 
 from ...encoding import Encoding
 from ...models import make_model
-from ...reports.claims import Claim, Decision, Numbers
+from ...reports.claims import Decision, Numbers, claim
 from ...reports.results import StudyResults
 from . import published
 from .headings import box_of, errors_of, headings
@@ -79,13 +79,30 @@ def _with_published(boxes: pd.DataFrame) -> pd.DataFrame:
     return boxes
 
 
+@claim(
+    "mean-biased-by-outliers",
+    "12",
+    "the median is under 45 degrees, and the mean at least twice the median",
+    published={
+        "median error (deg)": published.RESIZED["median_error_deg"][0],
+        "mean error (deg)": published.RESIZED["mean_error_deg"][0],
+    },
+    note="Published: appendix 7.3 at resize factor 1.",
+)
 def _outliers(results: StudyResults) -> Decision:
+    """Perfect memory recovers most headings; a few are completely wrong and raise the mean."""
     errors = errors_of(results.tables["headings"])
     median, mean = errors["median_error_deg"], errors["mean_error_deg"]
     return Decision({"median error (deg)": median, "mean error (deg)": mean}, median < 45 and mean >= 2 * median)
 
 
+@claim(
+    "error-grows-with-frequency",
+    "14",
+    "the rank correlation of the median error and the spacing of the remembered views is positive (p < 0.01)",
+)
 def _error_and_frequency(results: StudyResults) -> Decision:
+    """The fewer views of the route are remembered, the larger the median error."""
     boxes = results.tables["by_frequency"]
     rank = spearmanr(boxes["every"], boxes["median_error_deg"])
     medians = boxes.set_index("every")["median_error_deg"]
@@ -111,7 +128,15 @@ def _by_resolution(results: StudyResults, column: str) -> Numbers:
     }
 
 
+@claim(
+    "flat-then-rises-with-resize",
+    "16",
+    "at factors 1 to 4 no median is over 1.5 times another; at factors 8 to 10 their mean is at least a quarter higher",
+    published=lambda results: _by_resolution(results, "published_median_error_deg"),
+    note="Tested on views that are sampled, as cv2.resize does by default. Where views are averaged instead, no detail aliases.",
+)
 def _flat_then_rises(results: StudyResults) -> Decision:
+    """The median error is flat at small resize factors, then rises."""
     sampled = _by_resolution(results, "median_error_deg")
     fine, coarse, ratio = sampled.values()
     averaged = {
@@ -132,69 +157,37 @@ def _by_smoothing(results: StudyResults, column: str) -> Numbers:
     }
 
 
+@claim(
+    "smoothing-helps",
+    "7.3",
+    "over factors 3 to 8 the mean of the medians is lower with smoothing, and the median at more than half of the factors",
+    published=lambda results: _by_smoothing(results, "published_median_error_deg"),
+)
 def _smoothing_helps(results: StudyResults) -> Decision:
+    """Gaussian smoothing lowers the error at middle resolutions."""
     obtained = _by_smoothing(results, "median_error_deg")
     without, smoothed, share = obtained.values()
     return Decision(obtained, smoothed < without and share > 0.5)
 
 
+@claim(
+    "middle-resolution-best",
+    "16",
+    "the lowest median error with smoothing is at neither the first nor the last factor",
+    published={
+        "best factor, text of 4.3.4": 6.0,
+        "best factor, table of 7.3": float(1 + np.argmin(published.RESIZED_SMOOTHED["median_error_deg"])),
+    },
+    note="The thesis's text gives factor 6 as the best; its own table has the lowest error at factor 3.",
+)
 def _best_factor(results: StudyResults) -> Decision:
+    """A middle resolution is better than the original one."""
     boxes = results.tables["by_factor"]
     smoothed = boxes[(boxes["resizing"] == "sampled") & boxes["smoothed"]]
     best = float(smoothed.loc[smoothed["median_error_deg"].idxmin(), "factor"])
     return Decision({"best factor": best}, 1 < best < max(published.FACTORS))
 
 
-FREQUENCY_CLAIMS = (
-    Claim(
-        key="mean-biased-by-outliers",
-        figure="12",
-        statement="Perfect memory recovers most headings; a few are completely wrong and raise the mean.",
-        test="the median is under 45 degrees, and the mean at least twice the median",
-        published={
-            "median error (deg)": published.RESIZED["median_error_deg"][0],
-            "mean error (deg)": published.RESIZED["mean_error_deg"][0],
-        },
-        decide=_outliers,
-        note="Published: appendix 7.3 at resize factor 1.",
-    ),
-    Claim(
-        key="error-grows-with-frequency",
-        figure="14",
-        statement="The fewer views of the route are remembered, the larger the median error.",
-        test="the rank correlation of the median error and the spacing of the remembered views is positive (p < 0.01)",
-        decide=_error_and_frequency,
-    ),
-)
+FREQUENCY_CLAIMS = (_outliers, _error_and_frequency)
 
-RESOLUTION_CLAIMS = (
-    Claim(
-        key="flat-then-rises-with-resize",
-        figure="16",
-        statement="The median error is flat at small resize factors, then rises.",
-        test="at factors 1 to 4 no median is over 1.5 times another; at factors 8 to 10 their mean is at least a quarter higher",
-        published=lambda results: _by_resolution(results, "published_median_error_deg"),
-        decide=_flat_then_rises,
-        note="Tested on views that are sampled, as cv2.resize does by default. Where views are averaged instead, no detail aliases.",
-    ),
-    Claim(
-        key="smoothing-helps",
-        figure="7.3",
-        statement="Gaussian smoothing lowers the error at middle resolutions.",
-        test="over factors 3 to 8 the mean of the medians is lower with smoothing, and the median at more than half of the factors",
-        published=lambda results: _by_smoothing(results, "published_median_error_deg"),
-        decide=_smoothing_helps,
-    ),
-    Claim(
-        key="middle-resolution-best",
-        figure="16",
-        statement="A middle resolution is better than the original one.",
-        test="the lowest median error with smoothing is at neither the first nor the last factor",
-        published={
-            "best factor, text of 4.3.4": 6.0,
-            "best factor, table of 7.3": float(1 + np.argmin(published.RESIZED_SMOOTHED["median_error_deg"])),
-        },
-        decide=_best_factor,
-        note="The thesis's text gives factor 6 as the best; its own table has the lowest error at factor 3.",
-    ),
-)
+RESOLUTION_CLAIMS = (_flat_then_rises, _smoothing_helps, _best_factor)

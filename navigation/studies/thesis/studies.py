@@ -20,7 +20,7 @@ VERSION = 4  # of the studies: count it up with a change that alters their resul
 LOG = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Study:
     """A part of the thesis.
 
@@ -40,25 +40,18 @@ class Study:
 
 
 STUDIES = {
-    "setting": Study(title="The world and its views", run=setting.study),
-    "visual-compass": Study(title="One snapshot as a compass", run=visual_compass.study, claims=visual_compass.CLAIMS),
+    "setting": Study("The world and its views", setting.study),
+    "visual-compass": Study("One snapshot as a compass", visual_compass.study, visual_compass.CLAIMS),
     "frequency": Study(
-        title="Perfect memory, and how many views it needs",
-        run=perfect_memory.frequency,
-        claims=perfect_memory.FREQUENCY_CLAIMS,
+        "Perfect memory, and how many views it needs", perfect_memory.frequency, perfect_memory.FREQUENCY_CLAIMS
     ),
-    "resolution": Study(
-        title="Resolution and smoothing", run=perfect_memory.resolution, claims=perfect_memory.RESOLUTION_CLAIMS
-    ),
-    "classifier": Study(title="A network as a classifier", run=classifier.study, claims=classifier.CLAIMS, random=True),
-    "corners": Study(title="Corners", run=corners.study, claims=corners.CLAIMS, needs_tuning=True, random=True),
+    "resolution": Study("Resolution and smoothing", perfect_memory.resolution, perfect_memory.RESOLUTION_CLAIMS),
+    "classifier": Study("A network as a classifier", classifier.study, classifier.CLAIMS, random=True),
+    "corners": Study("Corners", corners.study, corners.CLAIMS, needs_tuning=True, random=True),
     "confidence": Study(
-        title="Confidence, training time and the width of the scan",
-        run=confidence.study,
-        claims=confidence.CLAIMS,
-        random=True,
+        "Confidence, training time and the width of the scan", confidence.study, confidence.CLAIMS, random=True
     ),
-    "beyond": Study(title="Beyond the thesis", run=beyond.study, claims=beyond.CLAIMS, random=True),
+    "beyond": Study("Beyond the thesis", beyond.study, beyond.CLAIMS, random=True),
 }
 
 

@@ -19,11 +19,11 @@ from tussock.world.geometry import Route
 from tussock.world.scene import World
 
 from ...evaluation import nearest_view
+from ...models.base import Images
+from .parameters import ENCODING
 
 MAX_DISTANCE = 0.5  # m; grid positions farther from the route are not used
-NEAR = (
-    0.2  # m; headings are recovered at grid positions within this distance of the route (section 4.3.1 of the thesis)
-)
+NEAR = 0.2  # m; headings are recovered at grid positions within this distance of the route (4.3.1)
 MIN_ROUTE_VIEWS, MIN_POSITIONS = 48, 8  # with fewer, the numbers have no meaning
 GRID_SPACING = 0.2  # m (4.1)
 
@@ -52,6 +52,16 @@ class StudyData:
     def nearest(self) -> np.ndarray:
         """Index of the nearest route view, for each grid pose: the thesis's place recognition (4.3.2)."""
         return nearest_view(self.route, self.poses[:, :2])
+
+    @cached_property
+    def route_images(self) -> Images:
+        """The route views as the thesis encodes them."""
+        return ENCODING(self.route_views)
+
+    @cached_property
+    def grid_images(self) -> Images:
+        """The grid views as the thesis encodes them."""
+        return ENCODING(self.grid_views)
 
     @cached_property
     def set_headings(self) -> Float[np.ndarray, " m"]:

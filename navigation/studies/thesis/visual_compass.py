@@ -11,7 +11,7 @@ from ...encoding import Encoding
 from ...evaluation import RECOVERED_DEG
 from ...models import make_model
 from ...models.base import Images
-from ...reports.claims import Claim, Decision
+from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...scan import best_turn
 from .headings import relative_to_set_heading
@@ -165,7 +165,17 @@ def _shares(around: pd.DataFrame) -> dict[str, float]:
     }
 
 
+@claim(
+    "idf-minimum",
+    "6",
+    (
+        "the lowest RMS difference (grey levels, median over twelve route views) is 0 at the same position for all of them, "
+        "and lower nearby than far away for eleven or more"
+    ),
+    published={"lowest RMS at the same place": 0.0},
+)
 def _lowest_differences(results: StudyResults) -> Decision:
+    """The image difference has a minimum of zero at the same position, a higher minimum nearby, and a still higher one far away."""
     curves = results.tables["idf"].astype({"rms": "float32"})  # as scans are
     lowest = curves.groupby(["reference", "view"])["rms"].min().unstack()
     medians = lowest.median()
@@ -177,7 +187,9 @@ def _lowest_differences(results: StudyResults) -> Decision:
     return Decision(obtained, bool((lowest["same"] < 1e-3).all() and (lowest["near"] >= lowest["far"]).sum() <= 1))
 
 
+@claim("visual-compass-near", "8", "over half of the headings within 0.25 m are less than 45 degrees off")
 def _recovered_nearby(results: StudyResults) -> Decision:
+    """One snapshot recovers the heading at most positions close to it."""
     near = results.numbers["share_recovered_within_0.25_m"]
     obtained = {
         "share recovered within 0.25 m": near,
@@ -186,7 +198,9 @@ def _recovered_nearby(results: StudyResults) -> Decision:
     return Decision(obtained, near > 0.5)
 
 
+@claim("error-grows-with-distance", "11", "the rank correlation of error and distance is positive (p < 0.01)")
 def _error_and_distance(results: StudyResults) -> Decision:
+    """The heading error grows with the distance from the snapshot."""
     around, rings = results.tables["around"], results.tables["by_distance"]
     rank = spearmanr(around["distance_m"], around["error_deg"])
     obtained = {
@@ -197,29 +211,4 @@ def _error_and_distance(results: StudyResults) -> Decision:
     return Decision(obtained, bool(rank.statistic > 0 and rank.pvalue < 0.01))
 
 
-CLAIMS = (
-    Claim(
-        key="idf-minimum",
-        figure="6",
-        statement="The image difference has a minimum of zero at the same position, a higher minimum nearby, and a still higher one "
-        "far away.",
-        test="the lowest RMS difference (grey levels, median over twelve route views) is 0 at the same position for all of them, "
-        "and lower nearby than far away for eleven or more",
-        published={"lowest RMS at the same place": 0.0},
-        decide=_lowest_differences,
-    ),
-    Claim(
-        key="visual-compass-near",
-        figure="8",
-        statement="One snapshot recovers the heading at most positions close to it.",
-        test="over half of the headings within 0.25 m are less than 45 degrees off",
-        decide=_recovered_nearby,
-    ),
-    Claim(
-        key="error-grows-with-distance",
-        figure="11",
-        statement="The heading error grows with the distance from the snapshot.",
-        test="the rank correlation of error and distance is positive (p < 0.01)",
-        decide=_error_and_distance,
-    ),
-)
+CLAIMS = (_lowest_differences, _recovered_nearby, _error_and_distance)
