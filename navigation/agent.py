@@ -54,6 +54,8 @@ class Agent:
         """Walk from each start, side by side: see `Walk.steps`. Walk k draws its noise from `seed` + k."""
         if self.trained.encoding is None:
             raise SettingError("the encoding of what the model learned is not known; give TrainedModel its encoding")
+        self.trained.check()
+        self.trained.check_eye(self.renderer.eye)
         walk = Walk(
             renderer=self.renderer,
             encoding=self.trained.encoding,

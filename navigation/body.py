@@ -12,5 +12,5 @@ class Body:
         heading_noise: Standard deviation of the normal noise on every turn (rad).
     """
 
-    step_length: float = number(0.05, above=0, unit="m")
+    step_length: float = number(0.05, low=1e-6, unit="m")
     heading_noise: float = number(0.0, low=0, unit="rad")

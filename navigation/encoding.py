@@ -11,12 +11,13 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
+from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
 from tussock.world.registry import Registry
 from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
-from .encoding_steps import EncodingStep, Images, Normalise, Resize, Views
+from .encoding_steps import Blur, EncodingStep, Images, Normalise, Resize, Views
 
 STEPS = Registry(
     "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
@@ -27,6 +28,7 @@ PRESETS = {
     "sky": "foreground-mask | {blur}{resize}normalise",
     "edges": "foreground-mask | {blur}vertical-edges | {resize}normalise",
 }
+FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
 BATCH = 4  # views that are encoded at once: they stay in the processor's cache through all steps
 
 
@@ -84,7 +86,7 @@ class Encoding:
         return self._text(STEPS.name_in_files)
 
     def _text(self, name_of: Callable[[type], str]) -> str:
-        steps = [[name_of(type(step)), *(f"{value:.15g}" for value in parameters_of(step))] for step in self.steps]
+        steps = [[name_of(type(step)), *map(format_number, parameters_of(step))] for step in self.steps]
         texts = list(map(" ".join, steps))
         return " | ".join(texts if len(texts) != 1 else [*texts, "resize 1"])  # one word alone may be a preset's name
 
@@ -115,7 +117,8 @@ class Encoding:
         """
         if name in PRESETS:
             text = PRESETS[name].format(
-                blur=f"blur {blur:.15g} | " if blur else "", resize=f"resize {resize:.15g} | " if resize != 1 else ""
+                blur=f"blur {format_number(blur)} | " if blur else "",
+                resize=f"resize {format_number(resize)} | " if resize != 1 else "",
             )
             return cls.parse(text.rstrip(" |"))
         if not ("|" in name or ":" in name or OLD_NAMES.get(name, name) in STEPS):
@@ -130,6 +133,27 @@ class Encoding:
 def label(step: Any) -> str:
     """The name of a step in a chain."""
     return STEPS.name_of(type(step))
+
+
+def automatic_resize(eye: Eye) -> float:
+    """The factor by which a preset encoding reduces the views of an eye."""
+    return max(1.0, eye.width / FINE_WIDTH)
+
+
+def describe_encoding(encoding: Encoding, eye: Eye) -> tuple[str, float | None, float]:
+    """An encoding in short: a preset's name, its resize (None: automatic) and blur; else the whole chain."""
+    blur = next((step.sigma for step in encoding.steps if isinstance(step, Blur)), 0.0)
+    resize = next((step.factor for step in encoding.steps if isinstance(step, Resize)), 1.0)
+    for name in PRESETS:
+        if Encoding.named(name, resize=resize, blur=blur) == encoding:
+            return name, None if resize == automatic_resize(eye) else resize, blur
+    return str(encoding), None, 0.0
+
+
+def format_number(number: float) -> str:
+    """A number with as many digits as it takes to read it back equal."""
+    short = f"{number:.15g}"
+    return short if float(short) == number else repr(float(number))
 
 
 def parameters_of(step: Any) -> list[float]:
@@ -148,4 +172,7 @@ def _parse_step(part: str, importing: bool) -> Any:
     if len(values) != len(names) or len(texts) != len(names):
         takes = f"{len(names)} number{'s' * (len(names) != 1)} ({', '.join(names)})" if names else "no numbers"
         raise SettingError(f"{name} takes {takes}, got {part.strip()!r}")
-    return kind(*values)
+    step = kind(*values)
+    if not callable(step):
+        raise SettingError(f"{name!r} is not an encoding step; name a class whose objects take and return images")
+    return step

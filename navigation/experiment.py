@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import converted, instance_of, number, settings
-from tussock.world.specs import Spec
+from tussock.world.specs import Spec, takes
 
 from .body import Body
 from .stopping import StoppingRules
@@ -42,12 +41,11 @@ if TYPE_CHECKING:
     from .walk import Step, Walk
 
 MODEL_SUFFIX = ".safetensors"  # of files of trained models
-FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
 
 
 def _encoding(value: Any, experiment: Any = None) -> Any:
     """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
-    from .encoding import PRESETS, Encoding
+    from .encoding import PRESETS, Encoding, automatic_resize
 
     if isinstance(value, Encoding):
         return value
@@ -65,18 +63,25 @@ def _model(value: Any) -> Any:
     if isinstance(value, Spec):
         return value
     from .models import MODELS, model_spec
+    from .models.base import Model
     from .models.opponents import Opponent
 
+    if isinstance(value, Model) and (value.shape is not None or value.seed or value.device != "cpu"):
+        raise SettingError(
+            f"{value!r} has learned, or has a seed or device; give an untrained model, and seed and device to the experiment"
+        )
     return model_spec(str(value)) if isinstance(value, str | Opponent) else MODELS.spec_of(value)
 
 
 def _navigator(value: Any) -> Any:
     """A navigator from its spec."""
-    if isinstance(value, str):
-        from .steering import NAVIGATORS
+    from .steering import NAVIGATORS
 
+    if isinstance(value, str):
         return NAVIGATORS.spec(value)
-    return value
+    if isinstance(value, Spec | type):
+        return value if isinstance(value, Spec) else NAVIGATORS.spec_of(value)
+    raise SettingError(f"navigator is {value!r}; give a spec, such as 'scan', or a class")
 
 
 @settings
@@ -104,16 +109,30 @@ class Experiment(Surroundings):
     device: str = attrs.field(default="cpu")
 
     def __attrs_post_init__(self):
+        from .models.base import FamiliarityModel
         from .models.checks import check_device
+        from .steering.navigator import Navigator
 
         super().__attrs_post_init__()
         check_device(self.device)
         if isinstance(self.model, Spec):
-            self.navigator.make(model=self.make_model())  # refuses bad parameters
+            model = self.make_model()  # refuses bad parameters
+            if not isinstance(model, FamiliarityModel):
+                raise SettingError(
+                    f"the model {str(self.model)!r} lacks fit(views) or scan(views); name a familiarity model"
+                )
+            if not isinstance(self.navigator.make(model=model), Navigator):
+                raise SettingError(
+                    f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
+                )
+        elif not takes(self.navigator.target, "model"):
+            raise SettingError(
+                f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"
+            )
 
     def replace(self, **changes: Any) -> "Experiment":
         """The same with some fields changed, as for `Surroundings`. With another eye, a preset encoding keeps its number of columns."""
-        from .encoding import PRESETS, Encoding
+        from .encoding import PRESETS, Encoding, automatic_resize, describe_encoding
 
         changed = super().replace(**changes)
         if changed.eye == self.eye:
@@ -145,6 +164,7 @@ class Experiment(Surroundings):
             progress: Called with how many training views are drawn, of how many.
             model: An untrained model to take in place of the experiment's.
         """
+        from .models.base import FamiliarityModel
         from .models.files import TrainedModel, load_model
         from .threads import threads
         from .training import training_views
@@ -162,7 +182,10 @@ class Experiment(Surroundings):
                 views, poses = training_views(self.encoding, renderer, wanted, progress)
                 navigator.learn(views)
         model = getattr(navigator, "model", None)
-        trained = model and TrainedModel(model=model, encoding=self.encoding, eye=self.eye, poses=poses)
+        if isinstance(model, FamiliarityModel) and getattr(model, "shape", ...) is not None:
+            trained = TrainedModel(model=model, encoding=self.encoding, eye=self.eye, poses=poses)
+        else:  # the navigator has none, or learns in a way of its own
+            trained = None
         return TrainedNavigator(
             renderer=renderer, route=route, navigator=navigator, model=trained, poses=poses,
             seconds=time.perf_counter() - began,
@@ -266,21 +289,3 @@ class TrainedNavigator:
         from .failures import Diagnostics
 
         return Diagnostics(self.renderer, self.model, self.route)
-
-
-def automatic_resize(eye: Eye) -> float:
-    """The factor by which a preset encoding reduces the views of an eye."""
-    return max(1.0, eye.width / FINE_WIDTH)
-
-
-def describe_encoding(encoding: "Encoding", eye: Eye) -> tuple[str, float | None, float]:
-    """An encoding in short: a preset's name, its resize (None: automatic) and blur; else the whole chain."""
-    from .encoding import PRESETS, Encoding
-    from .encoding_steps import Blur, Resize
-
-    blur = next((step.sigma for step in encoding.steps if isinstance(step, Blur)), 0.0)
-    resize = next((step.factor for step in encoding.steps if isinstance(step, Resize)), 1.0)
-    for name in PRESETS:
-        if Encoding.named(name, resize=resize, blur=blur) == encoding:
-            return name, None if resize == automatic_resize(eye) else resize, blur
-    return str(encoding), None, 0.0

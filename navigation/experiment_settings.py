@@ -7,10 +7,9 @@
 
 import dataclasses
 import hashlib
-import json
 import math
 import shlex
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +20,7 @@ from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
 
 from .body import Body
-from .experiment import MODEL_SUFFIX, Experiment, automatic_resize, describe_encoding
+from .experiment import MODEL_SUFFIX, Experiment
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .training_setup import TrainingSetup
@@ -30,11 +29,10 @@ if TYPE_CHECKING:
     from .encoding import Encoding
     from .models.files import TrainedModel
 
-VERSION = 4  # of what a run does: a change that alters results raises it, and runs that were kept are done again
-
-# Types of the settings, in the order of a table's columns. To add one: a field of `Experiment` or of the settings that it consists of,
-# its name here (and in WALK_SETTINGS if it changes only the walk), both directions in `experiment_of` and `settings_of`, and a flag of
-# `RunOptions` in cli/options.py. It is part of the key of a run from then on, so earlier folders of sweeps are not added to.
+# Types of the settings, in the order of a table's columns. To add one: a field of `Experiment` or of the settings that it
+# consists of; its name here (and in WALK_SETTINGS of experiment_keys.py if it changes only the walk); both directions in
+# `experiment_of` and `settings_of`; and a flag of `RunOptions` in cli/options.py. It is part of the key of a run from then on, so
+# no runs are added to earlier folders of sweeps.
 TYPES: dict[str, Any] = {
     "world": str, "world_seed": int | None, "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
@@ -43,17 +41,6 @@ TYPES: dict[str, Any] = {
     "offset_m": float, "heading_noise_deg": float, "scan_deg": float | None, "scan_about_deg": float | None, "on_lost": str,
     "waypoint_m": float, "arrive_m": float, "lost_m": float, "patience_m": float, "max_steps": int | None, "navigator": str,
 }  # fmt: skip
-ROUTE_SETTINGS = (
-    "world",
-    "world_seed",
-    "cull_back_faces",
-    "route",
-    "route_seed",
-    "route_length_m",
-)  # decide world and route
-WALK_SETTINGS = (  # decide the walk alone, not what is learned before
-    "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
-)  # fmt: skip
 
 
 def experiment_of(settings: Mapping[str, Any], models: "dict[Path, TrainedModel] | None" = None) -> Experiment:
@@ -88,6 +75,8 @@ def surroundings_of(settings: Mapping[str, Any]) -> Surroundings:
 
 def settings_of(experiment: Experiment) -> dict[str, Any]:
     """The settings that describe an experiment, by the names of TYPES; those that are derived from others are None."""
+    from .encoding import describe_encoding
+
     eye, training, body, stopping = experiment.eye, experiment.training, experiment.body, experiment.stopping
     encoding, resize, blur = describe_encoding(experiment.encoding, eye)
     navigator, parameters = experiment.navigator, dict(experiment.navigator.parameters)
@@ -145,21 +134,6 @@ def run_command(experiment: Experiment, out: str) -> str:
             flag = f"--{name.replace('_', '-')}"
             words += [flag] if value is True else [flag, str(value)]
     return shlex.join(["tussock", "run", *words, "--out", out])
-
-
-def key_of(experiment: Experiment) -> str:
-    """A digest of everything that decides a run, the contents of its files included."""
-    return _digest(experiment, TYPES)
-
-
-def route_key(experiment: Experiment) -> str:
-    """A digest of what decides the world and the route of a run."""
-    return "path-" + _digest(experiment, ROUTE_SETTINGS)
-
-
-def training_key(experiment: Experiment) -> str:
-    """A digest of what decides the training of a run."""
-    return "training-" + _digest(experiment, [name for name in TYPES if name not in WALK_SETTINGS])
 
 
 def degrees(angle: float) -> float:
@@ -226,7 +200,7 @@ def width_and_height(size: str) -> tuple[int, int]:
 
 
 def _encoding(given: Mapping[str, Any], eye: Eye, trained: "TrainedModel | None") -> "Encoding":
-    from .encoding import PRESETS, Encoding
+    from .encoding import PRESETS, Encoding, automatic_resize
 
     known = trained.encoding if trained is not None else None
     own = [name for name in ("encoding", "resize", "blur") if given.get(name)]
@@ -271,33 +245,17 @@ def _stopping(given: Mapping[str, Any]) -> StoppingRules:
     return StoppingRules(**rules, max_steps=given.get("max_steps"), put_back=on_lost == "reset")
 
 
-def _digest(experiment: Experiment, names: Collection[str]) -> str:
-    from tussock.world.params import is_generated
-
-    settings = settings_of(experiment)
-    kept: dict[str, Any] = {name: settings[name] for name in sorted(names)}
-    kept |= {name: experiment.seed if kept[name] is None else kept[name] for name in ("world_seed", "route_seed")}
-    kept["encoding"] = str(experiment.encoding) if "encoding" in names else None
-    if experiment.route is not None:
-        kept |= {"route": _content(experiment.route), "route_seed": None, "route_length_m": None}
-    if not (isinstance(experiment.world, str) and is_generated(experiment.world)):
-        kept |= {"world": _content(experiment.world), "world_seed": None}
-    if "model" in names and isinstance(experiment.model, Path):
-        kept["model"] = _content(experiment.model)
-    return hashlib.sha256(json.dumps([VERSION, kept], default=str).encode()).hexdigest()[:16]
-
-
 def _source(source: Any, kind: str) -> str:
     """How settings name a world or a route."""
-    return str(source) if isinstance(source, str | Path) else f"a {kind} in memory"
+    return str(source) if isinstance(source, str | Path) else f"a {kind} in memory ({content_of(source)})"
 
 
-def _content(source: Any) -> str:
+def content_of(source: Any) -> str:
     """Digest of a file, or of an object in memory."""
     if not isinstance(source, str | Path):
         import joblib
 
-        return str(joblib.hash(source))
+        return str(joblib.hash([getattr(source, each.name) for each in dataclasses.fields(source)]))
     status = Path(source).stat()
     return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
 

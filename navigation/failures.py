@@ -104,6 +104,9 @@ class Diagnostics:
                 measured.
             route: The route that the walk is to follow.
         """
+        if trained is not None:
+            trained.check()
+            trained.check_eye(renderer.eye)
         self._renderer, self._route = renderer, route
         self._learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None
         if trained is not None and trained.poses is not None and trained.encoding is not None:

@@ -61,7 +61,7 @@ class Surroundings:
     eye: Eye = instance_of(Eye, attrs.Factory(Eye), "an Eye")
     seed: int = whole(0, low=0)
     renderer: str = choice("auto", BACKENDS)
-    threads: int | None = whole(None, optional=True)
+    threads: int | None = whole(None, high=4096, optional=True)
 
     def __attrs_post_init__(self):
         if isinstance(self.world, str):
@@ -78,7 +78,7 @@ class Surroundings:
             outer, _, field = name.partition("__")
             inner.setdefault(outer, {})[field] = changes.pop(name)
         for outer, fields in inner.items():
-            changes[outer] = attrs.evolve(getattr(self, outer), **fields)
+            changes[outer] = attrs.evolve(changes.get(outer, getattr(self, outer)), **fields)
         return attrs.evolve(self, **changes)
 
     def open_world(self) -> "World":

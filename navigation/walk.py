@@ -105,7 +105,11 @@ class Walk:
         self.body, self.stopping = body or Body(), stopping or StoppingRules()
         self.field = renderer.world.field
         self.step_limit = self.stopping.step_limit(route.length, self.body.step_length)
-        generators = [np.random.default_rng(noise + k) for k in range(len(starts))] if isinstance(noise, int) else noise
+        generators = (
+            [np.random.default_rng(noise + k) for k in range(len(starts))]
+            if isinstance(noise, int | np.integer)
+            else noise
+        )
         self.agents = [Walker(self, *each) for each in zip(range(len(starts)), starts, generators, strict=True)]
         self._views: UInt8[np.ndarray, "n height width 4"] | None = None
         self._measure(self.agents)
@@ -122,6 +126,7 @@ class Walk:
             look = self.look()
             with one_torch_thread():
                 motion = navigator.decide(look, [memories[agent.number] for agent in walking])
+            check_motion(motion, len(walking), navigator)
             yield self.move(motion)
 
     def look(self) -> Look:
@@ -242,6 +247,22 @@ class StopCheck:
     def _at_goal(self, pose: Pose) -> bool:
         goal = self.route.goal
         return bool(np.hypot(pose.x - goal.x, pose.y - goal.y) <= self.stopping.arrival_radius)
+
+
+def check_motion(motion: Motion, n: int, navigator: Navigator) -> None:
+    """Refuse a motion that n agents cannot make. Raises SettingError."""
+    step = np.ones(n) if motion.step is None else np.asarray(motion.step)
+    valid = (
+        np.shape(motion.turn) == step.shape == (n,)
+        and np.isfinite(motion.turn).all()
+        and (step >= 0).all()
+        and (step <= 1).all()
+    )
+    if not valid:
+        raise SettingError(
+            f"{type(navigator).__name__} decided to turn by {motion.turn} and to step by {motion.step}; it must return {n} finite turns "
+            "(rad) and, if any, as many shares of a step, from 0 to 1"
+        )
 
 
 def check_inside(pose: Pose, field: Bounds) -> None:

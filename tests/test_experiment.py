@@ -22,18 +22,8 @@ from tussock.navigation.cli.models import RunCommand
 from tussock.navigation.cli.options import RunOptions
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
-from tussock.navigation.experiment_settings import (
-    ROUTE_SETTINGS,
-    TYPES,
-    WALK_SETTINGS,
-    default_settings,
-    experiment_of,
-    key_of,
-    route_key,
-    run_command,
-    settings_of,
-    training_key,
-)
+from tussock.navigation.experiment_keys import ROUTE_SETTINGS, WALK_SETTINGS, key_of, route_key, training_key
+from tussock.navigation.experiment_settings import TYPES, default_settings, experiment_of, run_command, settings_of
 from tussock.navigation.steering.navigator import Motion
 from tussock.navigation.stopping import StoppingRules
 from tussock.navigation.surroundings import BACKENDS, Surroundings

@@ -19,7 +19,8 @@ from tussock.navigation.benchmark.learners import enter_learner, tasks
 from tussock.navigation.benchmark.models import enter, enter_named
 from tussock.navigation.benchmark.results import Line, Result, interval_over_worlds, read_result, score
 from tussock.navigation.cli.benchmark import BenchmarkCommand
-from tussock.navigation.experiment_settings import ROUTE_SETTINGS, TYPES, experiment_of, settings_of
+from tussock.navigation.experiment_keys import ROUTE_SETTINGS
+from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.navigation.sweeps.work import learn, walk

@@ -23,7 +23,8 @@ from browser import WIDTHS, in_browser
 from commands import TUSSOCK, printed, process_json, tussock
 
 from tussock.navigation.experiment import Experiment
-from tussock.navigation.experiment_settings import TYPES, experiment_of, key_of, settings_of
+from tussock.navigation.experiment_keys import key_of
+from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model

@@ -36,7 +36,14 @@ class Registry:
             raise SettingError(f"{name!r} is a {self.kind} of tussock; register yours under another name")
         if not name or re.search(r"[\s|,=()]", name):
             raise SettingError(f"{name!r} cannot name a {self.kind}; give a name without spaces and without | , = ( )")
+        if target is None or isinstance(target, str | int | float):
+            raise SettingError(f"{target!r} is not a {self.kind}; register a class or function")
         self._registered[name] = target
+
+    @property
+    def registered(self) -> dict[str, Any]:
+        """What was registered in this process, by name."""
+        return dict(self._registered)
 
     @property
     def names(self) -> list[str]:
@@ -94,6 +101,8 @@ class Registry:
         """The spec of a class, or of an object that keeps its parameters under their names."""
         target = thing if isinstance(thing, type) else type(thing)
         defaults = own_parameters(target)
+        if missing := [name for name in defaults if thing is not target and not hasattr(thing, name)]:
+            raise SettingError(f"{thing!r} does not keep its {', '.join(missing)}; give its class, or a spec")
         given = {} if thing is target else {name: getattr(thing, name) for name in defaults}
         return Spec(
             self.name_of(target), target, {key: value for key, value in given.items() if value != defaults[key]}
@@ -122,7 +131,7 @@ class Registry:
         """What an entry point of an installed package refers to."""
         try:
             return point.load()
-        except (ImportError, AttributeError) as error:
+        except (Exception, SystemExit) as error:  # whatever another package does when it is imported
             raise SettingError(
                 f"the {self.kind} {point.name!r} of an installed package cannot be loaded ({error}); repair the package"
             ) from error
@@ -133,7 +142,7 @@ class Registry:
             sys.path.append("")
         try:
             return _load(location)
-        except (ImportError, SyntaxError, AttributeError, ValueError) as error:
+        except (Exception, SystemExit) as error:  # whatever the module does when it is imported
             raise SettingError(
                 f"the {self.kind} {location!r} cannot be imported ({error}); give package.module:Class of an installed package, "
                 "or of a file in the current folder"

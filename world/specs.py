@@ -41,12 +41,15 @@ class Spec:
         Raises:
             SettingError: Where a parameter without a default is missing, or one is unknown or given twice.
         """
-        given = {key: value for key, value in more.items() if key not in RESERVED or _takes(self.target, key)}
+        given = {key: value for key, value in more.items() if key not in RESERVED or takes(self.target, key)}
         try:
             signature_of(self.target).bind(**self.parameters, **given)
         except TypeError as error:
             raise SettingError(f"{str(self)!r} cannot be made ({error}); give its parameters as name=value") from error
         return self.target(**self.parameters, **given)
+
+    def __hash__(self) -> int:
+        return hash(str(self))
 
     def __str__(self) -> str:
         return format_spec(self.name, self.parameters)
@@ -73,7 +76,13 @@ def parse_spec(text: str, find: Callable[[str], Callable[..., Any]]) -> Spec:
     return Spec(name, target, {key: value for key, value in parameters.items() if value != defaults.get(key, ...)})
 
 
-signature_of = cache(inspect.signature)  # a sweep asks for the same few thousands of times
+@cache  # a sweep asks for the same few thousands of times
+def signature_of(target: Callable[..., Any]) -> inspect.Signature:
+    """The parameters of a class or function. Raises SettingError for objects that have none."""
+    try:
+        return inspect.signature(target)
+    except (TypeError, ValueError) as error:
+        raise SettingError(f"{target!r} has no parameters to set ({error}); name a class or function") from error
 
 
 def own_parameters(target: Callable[..., Any]) -> dict[str, Any]:
@@ -113,11 +122,11 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
         if not (key and value):
             raise SettingError(f"{word!r} is not a parameter; give name=value, without spaces")
         key = getattr(target, "renamed", {}).get(key, key)
-        in_degrees = not _takes(target, key) and key.removesuffix("_deg") in own
+        in_degrees = not takes(target, key) and key.removesuffix("_deg") in own
         key = key.removesuffix("_deg") if in_degrees else key
         if key in RESERVED:
             raise SettingError(f"{key} cannot be part of {name!r}; give it as --{key}, in Python as {key}=")
-        if not _takes(target, key):
+        if not takes(target, key):
             raise SettingError(f"{name} has no parameter {key!r}; its parameters are {', '.join(own) or 'none'}")
         if key in parameters:
             raise SettingError(f"{key} is given twice; give it once")
@@ -174,7 +183,7 @@ def format_value(value: Any) -> str:
     return str(value).lower() if value is None or isinstance(value, bool) else str(value)
 
 
-def _takes(target: Callable[..., Any], name: str) -> bool:
+def takes(target: Callable[..., Any], name: str) -> bool:
     """Whether a class or function takes a keyword."""
     taken = signature_of(target).parameters.values()
     return any(each.kind is each.VAR_KEYWORD or (each.name == name and each.kind in KEYWORDS) for each in taken)

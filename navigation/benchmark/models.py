@@ -8,7 +8,7 @@ from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import MODEL_SUFFIX, Experiment
-from ..experiment_settings import key_of
+from ..experiment_keys import key_of
 from ..models import model_spec
 from ..models.base import FamiliarityModel
 from ..sweeps.store import Store

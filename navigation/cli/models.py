@@ -78,7 +78,7 @@ class TrainCommand(ModelOptions):
         from tussock.world.atomic import check_writable
 
         from ..models.base import IncrementalModel, memory_bytes
-        from ..models.files import TrainedModel, load_model, save_model
+        from ..models.files import TrainedModel, check_can_be_saved, load_model, save_model
         from ..threads import threads
         from ..training import training_views
 
@@ -86,12 +86,13 @@ class TrainCommand(ModelOptions):
             raise FileError(f"{self.out}: a model is written as {MODEL_SUFFIX}")
         check_writable(self.out)
         experiment = self.experiment()
-        before = load_model(experiment.model) if isinstance(experiment.model, Path) else None
+        before = load_model(experiment.model, device=experiment.device) if isinstance(experiment.model, Path) else None
         model = experiment.make_model() if before is None else before.model
         if before is not None and not isinstance(model, IncrementalModel):
             raise SettingError(
                 f"{self.model}: {model} learns all its views at once and cannot go on; give --model '{model}'"
             )
+        check_can_be_saved(model)
         world, route = experiment.open_world_and_route()
         with open_renderer(experiment, world) as renderer, progress("drawing", "views") as report:
             wanted = experiment.training_poses(world, route)

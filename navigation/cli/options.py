@@ -150,13 +150,7 @@ class ModelOptions(LearningOptions):
 
     def experiment(self) -> Experiment:
         """The experiment that these flags describe. Raises InputError."""
-        if self.use:
-            from ..encoding import STEPS
-            from ..models import MODELS
-
-            for name in filter(None, map(str.strip, self.use.split(","))):
-                for registry in (MODELS, STEPS):
-                    registry.find(name)
+        import_used(self.use)
         return super().experiment()
 
 
@@ -190,6 +184,17 @@ class RunOptions(ModelOptions):
     """Limit of steps. Default: as many as three times the route's length needs."""
     navigator: str = default(Experiment, "navigator")
     """What steers: scan turns to the most familiar heading. Parameters may follow the name. One of your own is package.module:Class."""
+
+
+def import_used(names: str) -> None:
+    """Import the classes that --use names, so that files of models may need them. Raises SettingError where one cannot be imported."""
+    if names:
+        from ..encoding import STEPS
+        from ..models import MODELS
+
+        for name in filter(None, map(str.strip, names.split(","))):
+            for registry in (MODELS, STEPS):
+                registry.find(name)
 
 
 def open_renderer(surroundings: Surroundings, world: "World") -> "Renderer":

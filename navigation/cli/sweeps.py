@@ -9,7 +9,7 @@ import tyro
 
 from tussock.world.errors import SettingError
 
-from .options import Command, WorkerOptions
+from .options import Command, WorkerOptions, import_used
 from .terminal import message, progress
 
 
@@ -23,6 +23,8 @@ class SweepCommand(WorkerOptions):
     """Folder for the table of runs; runs that are finished there are not done again."""
     record: Annotated[str | None, tyro.conf.arg(metavar="worst:N")] = None
     """Keep recordings of the N worst runs."""
+    use: str = ""
+    """Classes of your own that files of models need, as package.module:Class; several with commas between them."""
 
     def run(self) -> dict[str, Any]:
         from ..sweeps.sweep_file import read_sweep
@@ -31,6 +33,7 @@ class SweepCommand(WorkerOptions):
         if record is None:
             raise SettingError(f"--record {self.record!r}: give worst:5, or another number")
         workers = self.chosen_workers()
+        import_used(self.use)
         sweep = read_sweep(self.sweep)
 
         from ..sweeps.sweep import record_worst, run_sweep

@@ -86,7 +86,9 @@ class SequenceModel(SnapshotModel, Protocol):
 
 def memory_bytes(model: FamiliarityModel) -> int | None:
     """Size of what any model has learned; None where the model does not report it."""
-    return getattr(model, "memory_bytes", None)
+    size = getattr(model, "memory_bytes", None)
+    size = size() if callable(size) else size
+    return None if size is None else int(size)
 
 
 @dataclass_transform(kw_only_default=True, eq_default=False, field_specifiers=(attrs.field,))

@@ -47,6 +47,13 @@ class TrainedModel:
     def __attrs_post_init__(self):
         self.check()
 
+    def check_eye(self, eye: Eye) -> None:
+        """Refuse an eye that is not that of the training views, where that is known. Raises SettingError."""
+        if self.eye is not None and self.eye != eye:
+            raise SettingError(
+                f"the model learned through another eye ({self.eye}) than this one ({eye}); use the same"
+            )
+
     def check(self) -> None:
         """Refuse an untrained model, and poses that cannot be those of the views that it learned. Raises SettingError."""
         if isinstance(self.model, Model) and self.model.shape is None:
@@ -75,10 +82,8 @@ def save_model(trained: TrainedModel, path: str | os.PathLike) -> None:
         FileError: Where the file cannot be written.
     """
     model, encoding, eye = trained.model, trained.encoding, trained.eye
-    if not isinstance(model, Model):
-        raise SettingError(
-            f"{path}: a {type(model).__name__} cannot be saved; derive it from tussock.navigation.models.base.Model"
-        )
+    check_can_be_saved(model)
+    assert isinstance(model, Model)
     trained.check()
     model.check_learned(model.shape, model.learned)  # type: ignore[arg-type]
     header = {
@@ -94,6 +99,14 @@ def save_model(trained: TrainedModel, path: str | os.PathLike) -> None:
         tensors["poses"] = torch.tensor(trained.poses)
     with replacing(path) as partial:
         partial.write_bytes(save(tensors, {HEADER: json.dumps(header, default=lambda number: number.item())}))
+
+
+def check_can_be_saved(model: FamiliarityModel) -> None:
+    """Refuse a model whose class knows no way to be saved. Raises SettingError."""
+    if not isinstance(model, Model):
+        raise SettingError(
+            f"a {type(model).__name__} cannot be saved; derive it from tussock.navigation.models.base.Model"
+        )
 
 
 def load_model(path: str | os.PathLike, *, expect: str | None = None, device: str = "cpu") -> TrainedModel:
@@ -112,6 +125,7 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
         SettingError: For a device that cannot be used, or has too little memory.
     """
     check_device(device)
+    expected = None if expect is None else model_in_files(make_model(expect))
     path = Path(path)
     try:
         header, tensors = _read(path)
@@ -120,7 +134,7 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
                 f"{path} is a model file of version {header.get('version')}, this is version {VERSION}; train it anew"
             )
         trained = _trained(path, header, tensors, device)
-        if expect is not None and header["model"] != model_in_files(make_model(expect)):
+        if expected is not None and header["model"] != expected:
             raise FileError(f"{path} holds a model {header['model']!r}, not {expect!r}; give another file")
         return trained
     except FileError:

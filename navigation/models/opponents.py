@@ -118,6 +118,7 @@ def opponents_of(cls: Callable[..., FamiliarityModel]) -> Callable[..., Familiar
         return opponent(cls(**parameters))
 
     make.__signature__ = inspect.signature(cls)  # type: ignore[attr-defined]
+    make.__module__, make.__qualname__ = cls.__module__, f"{OPPONENT}{getattr(cls, '__qualname__', '')}"
     make.renamed = getattr(cls, "renamed", {})  # type: ignore[attr-defined]
     return make
 

@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 def record_run(
     experiment: Experiment,
-    out: Path,
+    out: str | os.PathLike,
     *,
     overwrite: bool = False,
     viewer: str | None = None,
@@ -57,6 +57,7 @@ def record_run(
     Raises:
         InputError: Where the folder is taken or cannot be written, and for what the experiment refuses.
     """
+    out = Path(out)
     files = [Path(each) for each in (experiment.world, experiment.route) if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
     with experiment.opened(learning) as trained:

@@ -100,7 +100,7 @@ class RouteTask:
     def experiment(self) -> Experiment:
         """The experiment that an episode is a walk of, in the first world."""
         return Experiment(
-            world=self.world if isinstance(self.world, World) else os.fspath(self.world),
+            world=self.world,
             route=self.route,
             route_length=self.length,
             eye=self.eye,

@@ -17,7 +17,8 @@ from tussock.world.errors import FileError, InputError, MissingDependencyError, 
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
-from ..experiment_settings import TYPES, key_of, route_key, run_command, settings_of, training_key
+from ..experiment_keys import key_of, route_key, training_key
+from ..experiment_settings import TYPES, run_command, settings_of
 from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
@@ -165,6 +166,7 @@ def cluster(workers: str | int | None) -> Iterator[Client]:
             ) from error
         if not client.scheduler_info()["workers"]:
             log.info(f"no worker has joined yet; waiting for one: dask worker {scheduler} --nthreads 1")
+        client.register_plugin(work.Registrations())
         yield client
 
 

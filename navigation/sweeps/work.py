@@ -5,6 +5,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from distributed import WorkerPlugin
+
 from tussock.world.errors import InputError
 from tussock.world.geometry import Route
 from tussock.world.scene import World
@@ -12,6 +14,7 @@ from tussock.world.scene import World
 from ..experiment import Experiment, TrainedNavigator
 from ..failures import Cause
 from ..models.base import memory_bytes
+from ..registry import registry
 from ..trajectory import Trajectory
 
 
@@ -32,6 +35,20 @@ class Walked:
     steps: str
     seconds: float
     learn_seconds: float
+
+
+class Registrations(WorkerPlugin):
+    """Makes what this process has registered known to every worker, also to those that join later."""
+
+    def __init__(self) -> None:
+        self.registered = {
+            group: registry(group).registered for group in ("models", "encodings", "navigators", "worlds")
+        }
+
+    def setup(self, worker: Any) -> None:
+        for group, targets in self.registered.items():
+            for name, target in targets.items():
+                registry(group).register(name, target)
 
 
 def dask_setup(worker: Any) -> None:

@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from tussock.world.errors import SettingError
+from tussock.world.params import is_generated
 from tussock.world.settings import settings, whole
 
 from ...experiment import Experiment
@@ -127,7 +128,7 @@ def routes_in(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) 
     Returns:
         The world and route of an experiment, for each route.
     """
-    if Path(world).is_file():
+    if not is_generated(world) and Path(world).is_file():
         world = str(Path(world).resolve())  # so that workers in other folders find it
     if routes:
         paths = [route.resolve() if route.is_file() else route for route in routes]

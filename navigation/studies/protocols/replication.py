@@ -9,7 +9,7 @@ import pandas as pd
 from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 
-from ...experiment_settings import key_of
+from ...experiment_keys import key_of
 from ...reports.claims import Outcome, check_claims
 from ...reports.report import (
     REPORT,

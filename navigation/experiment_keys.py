@@ -1,0 +1,64 @@
+"""Keys of experiments: digests of everything that decides a run, or a part of it. By them a sweep finds the runs that it has done."""
+
+import hashlib
+import json
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+from tussock.world.params import is_generated
+from tussock.world.registry import Registry
+from tussock.world.specs import Spec, format_spec
+
+from .experiment import Experiment
+from .experiment_settings import TYPES, content_of, settings_of
+from .models.registry import MODELS
+from .steering.registry import NAVIGATORS
+
+VERSION = 4  # of what a run does: a change that alters results raises it, and runs that were kept are done again
+ROUTE_SETTINGS = (
+    "world",
+    "world_seed",
+    "cull_back_faces",
+    "route",
+    "route_seed",
+    "route_length_m",
+)  # decide world and route
+WALK_SETTINGS = (  # decide the walk alone, not what is learned before
+    "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
+)  # fmt: skip
+
+
+def key_of(experiment: Experiment) -> str:
+    """A digest of everything that decides a run, the contents of its files included."""
+    return _digest(experiment, TYPES)
+
+
+def route_key(experiment: Experiment) -> str:
+    """A digest of what decides the world and the route of a run."""
+    return "path-" + _digest(experiment, ROUTE_SETTINGS)
+
+
+def training_key(experiment: Experiment) -> str:
+    """A digest of what decides the training of a run."""
+    return "training-" + _digest(experiment, [name for name in TYPES if name not in WALK_SETTINGS])
+
+
+def _digest(experiment: Experiment, names: Collection[str]) -> str:
+    settings = settings_of(experiment)
+    kept: dict[str, Any] = {name: settings[name] for name in sorted(names)}
+    kept |= {name: experiment.seed if kept[name] is None else kept[name] for name in ("world_seed", "route_seed")}
+    if "encoding" in names:  # of what is learned: classes by what they are, whatever their names in this process
+        model = experiment.model
+        kept["encoding"] = experiment.encoding.text_in_files()
+        kept["model"] = content_of(model) if isinstance(model, Path) else _in_files(model, MODELS)
+        kept["navigator"] = _in_files(experiment.navigator, NAVIGATORS)
+    if experiment.route is not None:
+        kept |= {"route": content_of(experiment.route), "route_seed": None, "route_length_m": None}
+    if not (isinstance(experiment.world, str) and is_generated(experiment.world)):
+        kept |= {"world": content_of(experiment.world), "world_seed": None}
+    return hashlib.sha256(json.dumps([VERSION, kept], default=str).encode()).hexdigest()[:16]
+
+
+def _in_files(spec: Spec, registry: Registry) -> str:
+    return format_spec(registry.name_in_files(spec.target), spec.parameters)
