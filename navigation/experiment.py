@@ -7,6 +7,7 @@ The command line, sweep files, protocols, the test bed, the Gymnasium task and s
 settings that it consists of, and nowhere else. Importing this module is light: what does the work is loaded when it is used.
 """
 
+import logging
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from .steering.navigator import Navigator
     from .trajectory import Trajectory
     from .walk import Step, Walk
+
+log = logging.getLogger(__name__)
 
 MODEL_SUFFIX = ".safetensors"  # of files of trained models
 
@@ -244,6 +247,7 @@ class Experiment(Surroundings):
             route = self.open_route(world)
             check_inside(self.start(route), world.field)  # before the work begins
             renderer = stack.enter_context(self.open_renderer(world))
+            log.info(f"renderer: {renderer.backend}")
             yield self.train(renderer, route, progress)
 
     def run(self, progress: Progress = no_progress) -> "Trajectory":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import attrs
 
 from tussock.render.eye import Eye
-from tussock.world.errors import FileError
+from tussock.world.errors import FileError, SettingError
 from tussock.world.settings import choice, instance_of, number, settings, switch, whole
 
 if TYPE_CHECKING:
@@ -23,16 +23,27 @@ BACKENDS = ("auto", "cpu", "egl", "osmesa")
 
 def _world(value: Any) -> Any:
     """A world; a file as text, as the command line gives it."""
-    if not isinstance(value, Path):
+    if isinstance(value, str):
         return value
     from tussock.world.params import is_generated
+    from tussock.world.scene import World
 
+    if not isinstance(value, World | Path):
+        raise SettingError(f"world is {value!r}; give a preset's name, a file or a World")
+    if isinstance(value, World):
+        return value
     return os.path.join(os.curdir, value) if is_generated(str(value)) else str(value)  # a file named like a preset
 
 
 def _route(value: Any) -> Any:
     """A route; a file as its path."""
-    return Path(value) if isinstance(value, str) else value
+    if value is None or isinstance(value, str | Path):
+        return None if value is None else Path(value)
+    from tussock.world.geometry import Route
+
+    if not isinstance(value, Route):
+        raise SettingError(f"route is {value!r}; give a Route, its file, or None")
+    return value
 
 
 @settings

@@ -24,7 +24,9 @@ from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import ROUTE_SETTINGS, WALK_SETTINGS, key_of, route_key, training_key
 from tussock.navigation.experiment_settings import TYPES, default_settings, experiment_of, run_command, settings_of
-from tussock.navigation.steering.navigator import Motion
+from tussock.navigation.models import MODELS, PerfectMemory
+from tussock.navigation.models.files import TrainedModel, save_model
+from tussock.navigation.steering import NAVIGATORS, Motion, Scan
 from tussock.navigation.stopping import StoppingRules
 from tussock.navigation.surroundings import BACKENDS, Surroundings
 from tussock.navigation.training_setup import TrainingSetup
@@ -32,6 +34,7 @@ from tussock.render.eye import Eye
 from tussock.world.errors import InputError, SettingError
 from tussock.world.files import write_world
 from tussock.world.geometry import Route
+from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
 ROUTE = "x_m,y_m\n0,0\n1,1\n"
@@ -132,14 +135,13 @@ def test_angles_in_radians_keep_their_digits(noise, width, about, top):
 def test_settings_have_the_names_of_the_flags_of_run():
     assert list(settings_of(experiment_of({}))) == list(TYPES)
     flags = {each.name for each in dataclasses.fields(RunOptions)}
-    assert flags - set(TYPES) == {"use"}  # which names classes, and decides nothing
+    assert flags - set(TYPES) == {"use", "json"}  # which name classes and the output, and decide nothing
     assert set(TYPES) <= flags
     assert {each.name for each in dataclasses.fields(RunCommand)} - flags == {
         "out",
         "overwrite",
         "live",
         "viewer",
-        "json",
     }
 
 
@@ -315,7 +317,7 @@ def test_the_defaults_of_the_flags_are_those_of_the_experiment():
     assert RunOptions().experiment() == Experiment()
     command = parsed(["run"])
     assert command.experiment() == Experiment()
-    for each in dataclasses.fields(RunOptions):
+    for each in [each for each in dataclasses.fields(RunOptions) if each.name in TYPES]:
         assert each.default in (None, default_settings().get(each.name, ""))
 
 
@@ -418,3 +420,111 @@ def test_an_encoding_is_the_same_from_its_text(given_settings):
     """What a command prints as its encoding can be given back to it."""
     encoding = experiment_of(given_settings).encoding
     assert experiment_of({"encoding": str(encoding)}).encoding == encoding == Encoding.parse(str(encoding))
+
+
+# Classes from outside that do not fit, and objects that are not what a field takes
+
+
+class NoModel:
+    """A navigator that takes no model, and turns as it is told."""
+
+    def __init__(self, turn: float = 0.0, step: float = 1.0):
+        self.turn, self.step = turn, step
+
+    def learn(self, views):
+        self.model = "a linear layer, say"
+
+    def begin(self):
+        return None
+
+    def decide(self, look, memories):
+        return Motion(turn=np.full(len(look), self.turn), step=np.full(len(look), self.step))
+
+
+HERE = f"{__name__}:NoModel"
+TINY = {"world": "tiny", "eye": Eye(width=36, height=8), "route_length": 1.0}
+
+
+@pytest.fixture
+def forgetful(monkeypatch):
+    """Registries that forget afterwards what a test enters."""
+    for registry in (MODELS, NAVIGATORS):
+        monkeypatch.setattr(registry, "_registered", {})
+
+
+def test_a_navigator_with_something_else_as_its_model_walks(forgetful):
+    assert Experiment(**TINY, navigator=HERE, stopping=StoppingRules(max_steps=2)).run().summary()["steps"] == 2
+
+
+def test_a_navigator_that_takes_no_model_refuses_one_from_a_file(forgetful, tmp_path):
+    model = PerfectMemory().fit(torch.zeros(1, 4, 8))
+    save_model(TrainedModel(model=model), tmp_path / "a.safetensors")
+    with pytest.raises(SettingError, match="takes no model"):
+        Experiment(**TINY, navigator=HERE, model=tmp_path / "a.safetensors")
+
+
+@pytest.mark.parametrize("parameters", ["turn=inf", "step=7", "step=-1"])
+def test_a_motion_that_cannot_be_made_is_refused_naming_the_navigator(forgetful, parameters):
+    with pytest.raises(SettingError, match="NoModel decided"):
+        Experiment(**TINY, navigator=f"{HERE} {parameters}").run()
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("model", "builtins:dict", "builtins:dict"),
+        ("model", "os:getcwd", "fit"),
+        ("model", 5, "int"),
+        ("model", PerfectMemory(seed=3), "seed"),
+        ("model", PerfectMemory().fit(torch.zeros(1, 4, 8)), "untrained"),
+        ("navigator", "os:getcwd", "decide"),
+        ("navigator", Scan(model=PerfectMemory()), "spec"),
+        ("navigator", 5, "spec"),
+        ("encoding", "grey | math:sin 1", "math:sin"),
+        ("threads", 10**10, "threads"),
+        ("world", 5, "world"),
+        ("route", np.zeros((3, 2)), "route"),
+    ],
+)
+def test_what_a_field_cannot_be_is_refused(forgetful, field, value, words):
+    with pytest.raises(SettingError, match=words):
+        Experiment(**TINY | {field: value})
+
+
+def test_the_class_of_a_model_is_part_of_the_key_not_its_name_alone(forgetful):
+    class Other(PerfectMemory):
+        pass
+
+    keys = set()
+    for cls in (PerfectMemory, Other):
+        MODELS.register("near", cls)
+        keys.add(key_of(Experiment(**TINY, model="near")))
+    assert len(keys) == 2
+
+
+def test_routes_in_memory_have_keys_and_names_of_their_own_that_do_not_change():
+    world = World.generate("tiny", 0)
+    experiments = [Experiment(**TINY, route=generate_route(world, seed, 1.0)) for seed in (1, 2)]
+    keys = [key_of(each) for each in experiments]
+    assert len({*keys}) == 2
+    assert len({settings_of(each)["route"] for each in experiments}) == 2
+    _ = [each.route.length for each in experiments]  # which a route remembers
+    assert [key_of(each) for each in experiments] == keys
+
+
+@pytest.mark.parametrize("width", [500, 887, 720])
+def test_an_automatic_resize_is_recognised_at_any_width(width):
+    assert settings_of(Experiment(eye=Eye(width=width, height=100)))["resize"] is None
+
+
+def test_settings_and_a_field_of_them_can_be_replaced_together():
+    changed = Experiment().replace(body=Body(step_length=0.1), body__heading_noise=0.2)
+    assert changed.body == Body(step_length=0.1, heading_noise=0.2)
+
+
+def test_experiments_are_equal_and_hash_by_content():
+    world = World.generate("tiny", 0)
+    one, other = (Experiment(**TINY, route=generate_route(world, 1, 1.0)) for _ in range(2))
+    assert one == other
+    assert hash(one) == hash(other)
+    assert one != one.replace(route=generate_route(world, 2, 1.0))

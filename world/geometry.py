@@ -105,7 +105,7 @@ class Bounds(NamedTuple):
         return f"x {self.x_min:g}..{self.x_max:g} m, y {self.y_min:g}..{self.y_max:g} m"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Route:
     """A path over the ground with a heading at each of its points.
 
@@ -132,6 +132,12 @@ class Route:
             raise SettingError(f"a route needs at least 2 distinct points, got {len(poses)}")
         poses[:, 2] = wrap_angle(poses[:, 2])
         object.__setattr__(self, "poses", poses)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Route) and np.array_equal(self.poses, other.poses)
+
+    def __hash__(self) -> int:
+        return hash(self.poses.tobytes())
 
     @classmethod
     def through(cls, xy: Float[np.ndarray, "n 2"]) -> "Route":

@@ -61,7 +61,6 @@ def record_run(
     files = [Path(each) for each in (experiment.world, experiment.route) if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
     with experiment.opened(learning) as trained:
-        log.info(f"renderer: {trained.renderer.backend}")
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
         settings = _settings(experiment, trained)
         trajectory, seconds = _record(experiment, trained, out, viewer, settings, walking)
