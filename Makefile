@@ -6,7 +6,7 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .PHONY: run test test-slow lint format bench clean
 
-run: $(VENV)/installed  ## install, grow a world, learn a route, walk it home, say how to watch it
+run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, and print how to watch it
 	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
 	$(BIN)/tussock run --world world.glb --seed 7 --offset-m 0.1 --out run --overwrite
 	@echo
@@ -30,7 +30,7 @@ format: $(VENV)/developer
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(VENV)/developer  ## what things cost here, beside the naive way, into docs/performance.md; run it with nothing else running
+bench: $(VENV)/developer  ## the benchmarks, into docs/performance.md; run it while nothing else runs
 	for part in views matching walks; do \
 		$(BIN)/pytest benchmarks/bench_$$part.py --benchmark-quiet --benchmark-json=$(VENV)/bench_$$part.json || exit; done
 	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks,$(VENV)/bench_$(part).json)

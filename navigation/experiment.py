@@ -190,9 +190,13 @@ class Experiment(Surroundings):
         else:  # the navigator has none, or learns in a way of its own
             trained = None
         return TrainedNavigator(
-            renderer=renderer, route=route, navigator=navigator, model=trained, poses=poses,
+            renderer=renderer,
+            route=route,
+            navigator=navigator,
+            model=trained,
+            poses=poses,
             seconds=time.perf_counter() - began,
-        )  # fmt: skip
+        )
 
     def training_poses(self, world: "World", route: "Route"):
         """(n, 3) Poses that views are learned at; see `tussock.navigation.training.training_poses`."""

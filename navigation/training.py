@@ -13,7 +13,7 @@ from .encoding import Encoding
 from .models.base import FamiliarityModel
 from .models.files import TrainedModel
 
-AHEAD = 0.3  # m; a view beside the route faces the route this far ahead
+AHEAD = 0.3  # m; a view next to the route faces the route this far ahead
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
 BATCH = 64  # views rendered and encoded at once
 MIN_CONTRAST = 1e-3  # standard deviation of a feature image under which there is nothing to recognise
@@ -24,7 +24,7 @@ def training_poses(
 ) -> Float[np.ndarray, "n 3"]:
     """Poses to learn from: along the route, and, with a learning walk, on both sides of it.
 
-    Views on the route face along it. Views beside it face a point of the route AHEAD of there, so that following them leads back
+    Views on the route face along it. Views next to it face a point of the route AHEAD of there, so that following them leads back
     to the route. With views on the route alone, the recovered heading is parallel to the route, and displacement adds up.
 
     Args:

@@ -454,8 +454,8 @@ def test_mushroom_body_averages_over_neighbouring_rotations():
     learned, seen = views(8), views(3, 1)
     sharp = MushroomBody(smoothing_deg=0.0, cells=500).fit(learned).scan(seen).double()
     away = np.minimum(np.arange(24), 24 - np.arange(24)) * 15.0
-    bell = np.exp(-0.5 * (away / 20) ** 2)
-    expected = sum(weight * torch.roll(sharp, k, dims=1) for k, weight in enumerate(bell / bell.sum()))
+    gaussian = np.exp(-0.5 * (away / 20) ** 2)
+    expected = sum(weight * torch.roll(sharp, k, dims=1) for k, weight in enumerate(gaussian / gaussian.sum()))
     assert torch.allclose(
         MushroomBody(smoothing_deg=20.0, cells=500).fit(learned).scan(seen).double(), expected, atol=1e-5
     )

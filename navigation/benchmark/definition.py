@@ -46,7 +46,7 @@ class Benchmark:
     """A run for each combination of a world, a noise and a displacement.
 
     Attributes:
-        name: By which results tell what they are of.
+        name: Name that results refer to.
         worlds: The preset and seed of each; the seed is also that of the route, the model and the noise.
         noises_deg: On every turn (standard deviations, degrees).
         displacements: Of the start, to the left of the route (m; negative: right).
@@ -88,7 +88,7 @@ class Benchmark:
         return str(self.base.replace(encoding=encoding).encoding)
 
     def digest(self) -> str:
-        """Of everything that is asked, and of the first world of each preset and its route, to a tenth of a millimetre."""
+        """Digest of all settings, and of the first world of each preset and its route, to a tenth of a millimetre."""
         shared = {
             name: value for name, value in settings_of(self.base).items() if name in TYPES and name not in OF_ENTRY
         }

@@ -36,13 +36,16 @@ def leaderboard(results: Sequence[Result]) -> str:
     header = ["entry", "arrived", "95 %", "off the route", *(f"noise {noise}" for noise in noises), *presets, "memory"]
     rows = [
         [
-            _name(result), _percent(scores["totals"]["arrived_share"]),
-            " to ".join(_percent(end) for end in scores["totals"]["arrived_share_95"]), _cm(scores["totals"]["mean_deviation_m"]),
+            _name(result),
+            _percent(scores["totals"]["arrived_share"]),
+            " to ".join(_percent(end) for end in scores["totals"]["arrived_share_95"]),
+            _cm(scores["totals"]["mean_deviation_m"]),
             *(_percent(scores["by_noise_deg"][noise]["arrived_share"]) for noise in noises),
-            *(_percent(scores["by_preset"][preset]["arrived_share"]) for preset in presets), _size(result.memory_bytes),
+            *(_percent(scores["by_preset"][preset]["arrived_share"]) for preset in presets),
+            _size(result.memory_bytes),
         ]
         for scores, result in ranked
-    ]  # fmt: skip
+    ]
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 

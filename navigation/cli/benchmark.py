@@ -12,7 +12,7 @@ from .terminal import message, progress
 
 @dataclass
 class BenchmarkCommand(WorkerOptions):
-    """Enter models in the test bed: fixed worlds, routes, starts and noise, a result a model, and a leaderboard."""
+    """Enter models in the test bed: fixed worlds, routes, starts and noise, one result per model, and a leaderboard."""
 
     model: str | None = None
     """all, or names separated by commas (see tussock models), after which their parameters may follow."""
@@ -49,7 +49,7 @@ class BenchmarkCommand(WorkerOptions):
         benchmark = QUICK if self.quick else BENCHMARK
         names = list(MODELS.builtin) if self.model == "all" else split_list(self.model or "")
         files = []
-        for name in dict.fromkeys(map(checked_entry, names)):  # refuses what is none before the work begins
+        for name in dict.fromkeys(map(checked_entry, names)):  # refuses invalid names before the work begins
             message(f"{name}: {len(benchmark)} runs of {benchmark.name}")
             with progress("walking", "runs", verbose=True) as report:
                 result, path = enter_named(

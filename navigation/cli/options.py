@@ -144,7 +144,7 @@ class ModelOptions(LearningOptions):
     Parameters may follow the name, as in 'mushroom-body inputs=10 cells=20000' or 'mlp hidden_layer_sizes=100,50'.
     A model of your own is package.module:Class."""
     threads: int | None = None
-    """Threads to draw, learn and match with. Default: one a core. What networks learn depends on it in its last digits."""
+    """Threads to draw, learn and match with. Default: one per core. What networks learn depends on it in its last digits."""
     use: str = ""
     """Classes of your own that the file of a model needs, as package.module:Class; several with commas between them."""
 

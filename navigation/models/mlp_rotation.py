@@ -13,7 +13,7 @@ from tussock.world.settings import number, whole
 
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .filter_bank import FilterBank
-from .rotations import bell
+from .rotations import gaussian
 
 
 @model
@@ -63,7 +63,7 @@ class MLPRotation(Model):
         output = torch.randn(networks, self.units, generator=random) / self.units**0.5
         parameters = [self._on_device(each).requires_grad_() for each in (weights, biases, output)]
 
-        target = self._on_device(bell(width, math.radians(self.target_deg)))
+        target = self._on_device(gaussian(width, math.radians(self.target_deg)))
         noise = self.noise * float(views.std())
         optimiser = torch.optim.AdamW(parameters, lr=self.rate, weight_decay=self.weight_decay, fused=True)
         schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: rate_share(step / steps))

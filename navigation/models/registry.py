@@ -1,4 +1,4 @@
-"""Where the familiarity models stand, by name."""
+"""The registry of familiarity models."""
 
 from tussock.world.registry import Registry
 

@@ -17,7 +17,7 @@ def in_batches(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Ten
     return views.tensor_split(max(1, math.ceil(len(views) / size)))
 
 
-def bell(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:
+def gaussian(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:
     """A Gaussian over the rotations about rotation 0, of sum 1.
 
     Args:
@@ -39,5 +39,5 @@ def smoothed(scans: Float32[torch.Tensor, "n w"], deviation: float) -> Float32[t
         return scans
     width = scans.shape[1]
     rotation = torch.arange(width)
-    weights = bell(width, deviation)[(rotation[:, None] - rotation) % width]
+    weights = gaussian(width, deviation)[(rotation[:, None] - rotation) % width]
     return scans @ weights.to(scans.device)

@@ -201,7 +201,7 @@ def _spaces(task: RouteTask) -> tuple[Box, Box]:
 
 
 def _seed(seed: Any) -> int | None:
-    """A seed as Gymnasium takes it, which knows Python's own whole numbers only. Raises SettingError for what is none."""
+    """A seed as Gymnasium takes it, which takes only Python integers. Raises SettingError for other values."""
     if seed is None:
         return None
     if not isinstance(seed, Integral) or int(seed) < 0:

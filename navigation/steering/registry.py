@@ -1,4 +1,4 @@
-"""Where the navigators stand, by name."""
+"""The registry of navigators."""
 
 from tussock.world.registry import Registry
 

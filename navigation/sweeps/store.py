@@ -43,8 +43,8 @@ class Finished:
 class Store:
     """The finished runs in a folder; use it in a `with` statement. While it is open to be written to, no other sweep may write.
 
-    The table is SQLite's: a row that was added stays, and one that was not yet is not there at all, whatever ends the process.
-    Settings have one row: where a file that they name has changed, the run with what it holds now takes the other's place.
+    A row is either added completely or not at all, whatever ends the process (SQLite). There is one row per set of settings: if a
+    file that they name has changed, the new run replaces the old one.
     """
 
     def __init__(self, folder: Path, *, read_only: bool = False):
@@ -142,7 +142,7 @@ def _locked(folder: Path) -> FileLock:
 
 
 def _unusable(path: Path, error: sqlite3.Error) -> FileError:
-    """What went wrong with the database, as people can mend it."""
+    """What is wrong with the database, and what to do."""
     if "full" in str(error):
         return DiskFullError(
             f"{path}: no space is left; all runs kept before are intact: make room and give the same command again"
@@ -151,7 +151,7 @@ def _unusable(path: Path, error: sqlite3.Error) -> FileError:
 
 
 def table_of(rows: dict[str, dict[str, Any]]) -> pd.DataFrame:
-    """A row a run, in an order and with types that depend on the runs alone."""
+    """One row per run, in an order and with types that depend on the runs alone."""
     table = pd.DataFrame([{"key": key} | row for key, row in sorted(rows.items(), key=_in_order)], dtype=object)
     return table.astype({name: _type_of(values) for name, values in table.items()})
 

@@ -208,7 +208,7 @@ def record_again(experiment: Experiment, row: dict[str, Any], out: Path) -> None
 
 
 def _write_table(store: Store, out: Path) -> Path:
-    """Write the table of all finished runs, with where their recordings are, where they are."""
+    """Write the table of all finished runs. A column gives the path of the recording, if there is one."""
     rows = store.rows()
     for key, row in rows.items():
         recorded = (out / WORST / key / "summary.json").exists()
