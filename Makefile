@@ -15,7 +15,7 @@ run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, an
 	@echo "    $(BIN)/tussock play run --web    (a browser, where there is no display)"
 
 test: $(VENV)/developer  ## the quick tests, on all cores
-	$(BIN)/pytest -n auto --dist loadfile
+	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder
 
 test-slow: $(VENV)/developer  ## the tests that take long: killed processes, full disks, whole studies, browsers
 	$(BIN)/pytest -n auto -m slow

@@ -66,6 +66,7 @@ def test_each_example_has_at_most_20_lines(text):
     assert len(lines) <= 20
 
 
+@pytest.mark.slow
 def test_commands_of_the_page_run_with_the_installed_package(installed, tmp_path):
     (block,) = blocks("bash")
     commands = [shlex.split(line)[1:] for line in block.splitlines() if line.startswith("tussock")]
@@ -89,7 +90,7 @@ def test_names_of_installed_classes_are_listed(installed, tmp_path):
     assert "Is the mean difference as good a guide" in run(["replicate", "--help"], installed, tmp_path).stdout
 
 
-@pytest.mark.parametrize("name", ["nearest", "antlab.models:Nearest"])
+@pytest.mark.parametrize("name", ["nearest", pytest.param("antlab.models:Nearest", marks=pytest.mark.slow)])
 def test_a_sweep_on_two_workers_takes_classes_from_outside(name, installed, tmp_path):
     sweep = tmp_path / "sweep.toml"
     sweep.write_text(
@@ -119,6 +120,7 @@ def test_a_file_in_the_current_folder_is_enough(source, tmp_path):
     assert (result["runs"], result["could_not_run"]) == (2, 0)
 
 
+@pytest.mark.slow
 def test_a_class_with_fit_and_scan_alone_is_a_model(tmp_path):
     (tmp_path / "plain.py").write_text(
         "class First:\n"

@@ -195,7 +195,7 @@ def test_a_list_is_split_at_commas_outside_parentheses(text, parts):
     assert split_list(text) == parts
 
 
-SMALL = ("--world", "tiny", "--seed", "2", "--size", "60x10", "--samples", "1", "--spacing-m", "0.1", "--json")
+SMALL = ["--world", "tiny", "--size", "40x10", "--route-length-m", "1", "--spacing-m", "0.1", "--json"]
 
 
 def printed(*arguments: str) -> dict:

@@ -36,7 +36,7 @@ def block(language: str) -> str:
 def test_the_commands_of_readme_work_in_a_small_world(capfd, tmp_path, cluster, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("sweep.toml").write_text(block("toml").replace("to = 4", "to = 0"))
-    more = {"sweep": ["--scheduler", cluster], "compare": ["--size", "90x20"], "study": ["--size", "72x15"]}
+    more = {"sweep": ["--scheduler", cluster], "compare": ["--size", "40x10"], "study": ["--size", "72x15"]}
     assert len(commands()) >= 5
     for arguments in commands():
         small = [SMALL_WORLD if each == "tussock-field" else each for each in arguments]
