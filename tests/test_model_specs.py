@@ -1,13 +1,12 @@
 """Specs of models: a text with a name and parameters, and the model that it describes."""
 
-import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import attrs
 import pytest
+from commands import printed
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import views
@@ -195,23 +194,17 @@ def test_a_list_is_split_at_commas_outside_parentheses(text, parts):
     assert split_list(text) == parts
 
 
-SMALL = ["--world", "tiny", "--size", "40x10", "--route-length-m", "1", "--spacing-m", "0.1", "--json"]
+SMALL = ["--world", "tiny", "--size", "40x10", "--route-length-m", "1", "--spacing-m", "0.1"]
 
 
-def printed(*arguments: str) -> dict:
-    done = subprocess.run([TUSSOCK, *arguments, *SMALL], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-def test_commands_take_a_spec_and_report_it(tmp_path):
+def test_commands_take_a_spec_and_report_it(capfd, tmp_path):
     texts = ["mlp hidden_layer_sizes=(8,4) max_iter=3", "mushroom-body cells=200 active=0.05"]
-    rows = printed("compare", "--models", ", ".join(texts))["models"]
+    rows = printed(capfd, "compare", *SMALL, "--models", ", ".join(texts))["models"]
     assert list(rows) == texts
     for text in texts:
-        evaluated = printed("evaluate", "--model", text)
+        evaluated = printed(capfd, "evaluate", *SMALL, "--model", text)
         assert evaluated["model"] == text
         assert evaluated["median_error_deg"] == rows[text]["median_error_deg"]
     file = str(tmp_path / "m.safetensors")
-    assert printed("train", "--model", texts[1], "--out", file)["model"] == texts[1]
-    assert printed("evaluate", "--model", file)["model"] == texts[1]
+    assert printed(capfd, "train", *SMALL, "--model", texts[1], "--out", file)["model"] == texts[1]
+    assert printed(capfd, "evaluate", *SMALL, "--model", file)["model"] == texts[1]
