@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tussock.navigation.body import Body
-from tussock.navigation.cli.main import COMMANDS, choice_of, main
+from tussock.navigation.cli.main import choice_of, commands_for, main
 from tussock.navigation.cli.models import RunCommand
 from tussock.navigation.cli.options import RunOptions
 from tussock.navigation.encoding import Encoding
@@ -104,7 +104,7 @@ def folder(tmp_path_factory):
 def parsed(arguments: list[str]) -> Any:
     """A command with its flags."""
     config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
-    return tyro.cli(choice_of(COMMANDS), args=arguments, config=config)
+    return tyro.cli(choice_of(commands_for(arguments)), args=arguments, config=config)
 
 
 # Settings

@@ -1,49 +1,51 @@
 """The command line: gives flags to the commands, and prints their results."""
 
+import ast
 import json
 import os
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import make_dataclass
+from functools import cache
+from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated, Any, Union
 
 import tyro
 
 from tussock.world.errors import InputError
 
-from .benchmark import BenchmarkCommand
-from .databases import DatabaseCheckCommand, DatabaseGridCommand, DatabaseRouteCommand
-from .models import CompareCommand, EvaluateCommand, ModelsCommand, PlayCommand, RunCommand, TrainCommand
-from .protocols import protocol_commands
-from .studies import StudyCommand, ThesisCommand
-from .sweeps import ReportCommand, SweepCommand
 from .terminal import library_messages, message, show
-from .worlds import RouteCommand, ViewCommand, WorldCommand
 
-# A command by its name, or a sentence and the commands that go under one name.
+# Where the class of a command is, by its name; or a sentence and the commands that go under one name.
 COMMANDS: dict[str, Any] = {
-    "world": WorldCommand,
-    "view": ViewCommand,
-    "route": RouteCommand,
-    "evaluate": EvaluateCommand,
-    "train": TrainCommand,
-    "compare": CompareCommand,
-    "models": ModelsCommand,
-    "run": RunCommand,
-    "play": PlayCommand,
-    "sweep": SweepCommand,
-    "report": ReportCommand,
-    "benchmark": BenchmarkCommand,
+    "world": "worlds:WorldCommand",
+    "view": "worlds:ViewCommand",
+    "route": "worlds:RouteCommand",
+    "evaluate": "models:EvaluateCommand",
+    "train": "models:TrainCommand",
+    "compare": "models:CompareCommand",
+    "models": "models:ModelsCommand",
+    "run": "models:RunCommand",
+    "play": "models:PlayCommand",
+    "sweep": "sweeps:SweepCommand",
+    "report": "sweeps:ReportCommand",
+    "benchmark": "benchmark:BenchmarkCommand",
     "replicate": (
         "Re-run a published study and write a report to read next to it.",
-        {"thesis": ThesisCommand},  # and the protocols: see `commands_for`
+        {"thesis": "studies:ThesisCommand"},  # and the protocols: see `commands_for`
     ),
-    "study": StudyCommand,
+    "study": "studies:StudyCommand",
     "database": (
         "Draw image databases in the BoB format, and look for what is wrong with them.",
-        {"grid": DatabaseGridCommand, "route": DatabaseRouteCommand, "check": DatabaseCheckCommand},
+        {
+            "grid": "databases:DatabaseGridCommand",
+            "route": "databases:DatabaseRouteCommand",
+            "check": "databases:DatabaseCheckCommand",
+        },
     ),
 }
 
@@ -89,11 +91,44 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def commands_for(arguments: list[str]) -> dict[str, Any]:
-    """The commands that some arguments choose from. Protocols, which packages may add, are looked for only after `replicate`."""
-    if arguments[:1] != ["replicate"]:
-        return COMMANDS
-    sentence, fixed = COMMANDS["replicate"]
-    return COMMANDS | {"replicate": (sentence, fixed | protocol_commands(*arguments[1:2]))}
+    """The commands that some arguments choose from. Only the chosen one is imported: so its flags, or all sentences, appear at once."""
+    chosen = arguments[0] if arguments and arguments[0] in COMMANDS else None
+    commands = {name: _placeholder("" if chosen else _sentence(each)) for name, each in COMMANDS.items()}
+    if chosen is not None:
+        commands[chosen] = _imported(COMMANDS[chosen])
+    if chosen == "replicate":  # packages may add protocols
+        from .protocols import protocol_commands
+
+        sentence, fixed = commands["replicate"]
+        commands["replicate"] = (sentence, fixed | protocol_commands(*arguments[1:2]))
+    return commands
+
+
+def _imported(command: Any) -> Any:
+    """The class of a command, or a sentence and the classes of the commands under one name."""
+    if isinstance(command, tuple):
+        return command[0], {name: _imported(each) for name, each in command[1].items()}
+    module, _, name = command.partition(":")
+    return getattr(import_module(f".{module}", __package__), name)
+
+
+def _sentence(command: Any) -> str:
+    """What a command does: the docstring of its class, which is read, not imported, as that takes long."""
+    if isinstance(command, tuple):
+        return command[0]
+    module, _, name = command.partition(":")
+    classes = [each for each in _syntax(module).body if isinstance(each, ast.ClassDef) and each.name == name]
+    return ast.get_docstring(classes[0]) or name
+
+
+@cache
+def _syntax(module: str) -> ast.Module:
+    return ast.parse(Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8"))
+
+
+def _placeholder(sentence: str) -> type:
+    """A command without flags, for a list of the commands."""
+    return make_dataclass("Placeholder", [], namespace={"__doc__": sentence})
 
 
 def choice_of(commands: dict[str, Any]) -> Any:
