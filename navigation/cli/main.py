@@ -93,7 +93,9 @@ def main(arguments: list[str] | None = None) -> None:
 def commands_for(arguments: list[str]) -> dict[str, Any]:
     """The commands that some arguments choose from. Only the chosen one is imported: so its flags, or all sentences, appear at once."""
     chosen = arguments[0] if arguments and arguments[0] in COMMANDS else None
-    commands = {name: _placeholder("" if chosen else _sentence(each)) for name, each in COMMANDS.items()}
+    commands: dict[str, Any] = {
+        name: _placeholder("" if chosen else _sentence(each)) for name, each in COMMANDS.items()
+    }
     if chosen is not None:
         commands[chosen] = _imported(COMMANDS[chosen])
     if chosen == "replicate":  # packages may add protocols
