@@ -23,7 +23,7 @@ from tussock.navigation.encoding_steps import Grey, VerticalEdges
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.rl.environment import ID, RouteFollowing, RouteFollowingVector
-from tussock.navigation.rl.task import ARRIVAL_REWARD, RouteTask
+from tussock.navigation.rl.task import ARRIVAL_REWARD, Courses, RouteTask
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.navigation.stopping import StopReason
 from tussock.navigation.training import train, training_poses
@@ -31,7 +31,7 @@ from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError
 from tussock.world.files import write_world
-from tussock.world.geometry import Route
+from tussock.world.geometry import Bounds, Route
 from tussock.world.route_files import write_route
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
@@ -324,6 +324,14 @@ def test_training_views_are_the_observations_at_their_poses(make_env):
         assert np.array_equal(env.reset(options={"start": pose})[0], view)
     many = make_env(RouteFollowingVector, 2, route=STRAIGHT)
     assert np.array_equal(many.training_views(1, learning_walk=0.1, spacing=0.5)[0], views)
+
+
+def test_training_views_are_those_of_the_route_of_their_seed():
+    courses = Courses(RouteTask(world="tiny", eye=SMALL, length=1.0))
+    poses = {seed: courses.training_views(seed, learning_walk=0.0, spacing=0.5)[1] for seed in (0, 5)}
+    for seed in poses:
+        assert np.array_equal(poses[seed], training_poses(courses[seed].route, 0.5, field=Bounds(0, 0, 3, 3)))
+    courses.close()
 
 
 def test_frames_are_enlarged_views(make_env):
