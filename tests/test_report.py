@@ -63,6 +63,7 @@ def replication(tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_results_hold_published_and_obtained_numbers(replication):
     text = (replication / "results.json").read_text()
     results = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
@@ -83,6 +84,7 @@ def test_results_hold_published_and_obtained_numbers(replication):
     assert studies["corners"]["holds"].keys() == {"corners-change-faster", "worse-in-corners", "more-corner-views-help"}
 
 
+@pytest.mark.slow
 def test_the_page_is_self_contained_and_has_everything(replication):
     page = (replication / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
@@ -99,11 +101,13 @@ def test_the_page_is_self_contained_and_has_everything(replication):
 
 
 @pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.slow
 def test_a_browser_shows_it_without_errors(replication, tmp_path, width):
     shown = in_browser(replication / "report.html", width, tmp_path)
     assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": len(FIGURES)}
 
 
+@pytest.mark.slow
 def test_a_second_run_does_nothing_again_and_changes_no_byte(replication):
     before = {path.name: path.read_bytes() for path in (replication / "results.json", replication / "report.html")}
     done = tussock("replicate", "thesis", *TINY, "--out", replication)
@@ -112,6 +116,7 @@ def test_a_second_run_does_nothing_again_and_changes_no_byte(replication):
     assert {name: (replication / name).read_bytes() for name in before} == before
 
 
+@pytest.mark.slow
 def test_a_report_of_something_else_is_not_replaced(replication, capsys):
     with pytest.raises(SystemExit) as end:
         main(["replicate", "thesis", *TINY, "--seed", "3", "--out", str(replication)])
@@ -119,6 +124,7 @@ def test_a_report_of_something_else_is_not_replaced(replication, capsys):
     assert "holds a report of something else (Seeds)" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_another_study_does_not_replace_a_report(replication, capsys):
     with pytest.raises(SystemExit) as end:
         main(["study", "setting", *TINY, "--out", str(replication)])
@@ -126,6 +132,7 @@ def test_another_study_does_not_replace_a_report(replication, capsys):
     assert "holds a report of something else (Studies)" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_one_figure_alone(replication, tmp_path):
     page = (replication / "report.html").read_text(encoding="utf-8")
     assert (
