@@ -107,6 +107,7 @@ def test_a_sweep_on_two_workers_takes_classes_from_outside(name, installed, tmp_
     assert repeated["steps"] == table[table["model"] != "perfect-memory"].iloc[0]["steps"]
 
 
+@pytest.mark.slow
 def test_a_file_in_the_current_folder_is_enough(source, tmp_path):
     """By its location, in this process and in the workers of a sweep."""
     (tmp_path / "my_models.py").write_text((source / "antlab" / "models.py").read_text())

@@ -33,6 +33,7 @@ def block(language: str) -> str:
     return text
 
 
+@pytest.mark.slow
 def test_the_commands_of_readme_work_in_a_small_world(capfd, tmp_path, cluster, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("sweep.toml").write_text(block("toml").replace("to = 4", "to = 0"))
