@@ -23,7 +23,7 @@ class EncodingStep(ABC):
     """One step of an encoding. Its parameters are numbers, in the order in which a chain lists them.
 
     Attributes:
-        name: In a chain.
+        name: Of a step of tussock, in a chain. A step from outside is named where it is registered.
         takes_views: It begins a chain: it takes panoramas (n, height, width, 3 or 4) uint8. All other steps take images.
         takes_unit_range: It takes values from 0 to 1 only, so it cannot follow `Normalise`.
     """

@@ -167,7 +167,7 @@ class Experiment(Surroundings):
             progress: Called with how many training views are drawn, of how many.
             model: An untrained model to take in place of the experiment's.
         """
-        from .models.base import FamiliarityModel
+        from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
         from .training import training_views
@@ -185,10 +185,9 @@ class Experiment(Surroundings):
                 views, poses = training_views(self.encoding, renderer, wanted, progress)
                 navigator.learn(views)
         model = getattr(navigator, "model", None)
-        if isinstance(model, FamiliarityModel) and getattr(model, "shape", ...) is not None:
+        trained = None  # where the navigator has no model, or learns without it
+        if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):
             trained = TrainedModel(model=model, encoding=self.encoding, eye=self.eye, poses=poses)
-        else:  # the navigator has none, or learns in a way of its own
-            trained = None
         return TrainedNavigator(
             renderer=renderer,
             route=route,
@@ -209,10 +208,7 @@ class Experiment(Surroundings):
 
     def check_matches(self, trained: "TrainedModel") -> None:
         """Refuse a trained model that learned through another eye or encoding. Raises SettingError."""
-        if trained.eye is not None and trained.eye != self.eye:
-            raise SettingError(
-                f"{self.model} learned through another eye ({trained.eye}) than this experiment's ({self.eye}); use the same"
-            )
+        trained.check_eye(self.eye)
         if trained.encoding is not None and trained.encoding != self.encoding:
             raise SettingError(
                 f"{self.model} learned views encoded as {str(trained.encoding)!r}, this experiment has {str(self.encoding)!r}; use the same"

@@ -28,20 +28,20 @@ def _world(value: Any) -> Any:
     from tussock.world.params import is_generated
     from tussock.world.scene import World
 
-    if not isinstance(value, World | Path):
+    if isinstance(value, Path):
+        return os.path.join(os.curdir, value) if is_generated(str(value)) else str(value)  # a file named like a preset
+    if not isinstance(value, World):
         raise SettingError(f"world is {value!r}; give a preset's name, a file or a World")
-    if isinstance(value, World):
-        return value
-    return os.path.join(os.curdir, value) if is_generated(str(value)) else str(value)  # a file named like a preset
+    return value
 
 
 def _route(value: Any) -> Any:
     """A route; a file as its path."""
-    if value is None or isinstance(value, str | Path):
-        return None if value is None else Path(value)
+    if isinstance(value, str | Path):
+        return Path(value)
     from tussock.world.geometry import Route
 
-    if not isinstance(value, Route):
+    if not isinstance(value, Route | None):
         raise SettingError(f"route is {value!r}; give a Route, its file, or None")
     return value
 

@@ -63,7 +63,7 @@ def test_a_users_own_files_of_the_same_names_do_not_matter(folder):
 
 @pytest.mark.slow
 def test_a_wheel_is_complete(folder):
-    """Every module and every other file that is needed is in it: a run, a sweep with its report, and the page of a study."""
+    """It has every module, and the files that a run, a sweep and its report need."""
     copy, target = folder / "clone", folder / "installed"
     shutil.copytree(CLONE, copy, ignore=shutil.ignore_patterns(".*", "build", "*.egg-info", "__pycache__", "installed"))
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", target]
