@@ -18,6 +18,7 @@ import attrs
 
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
+from tussock.world.mesh_reading import MeshReading
 
 from .body import Body
 from .experiment import MODEL_SUFFIX, Experiment
@@ -34,7 +35,8 @@ if TYPE_CHECKING:
 # `experiment_of` and `settings_of`; and a flag of `RunOptions` in cli/options.py. It is part of the key of a run from then on, so
 # no runs are added to earlier folders of sweeps.
 TYPES: dict[str, Any] = {
-    "world": str, "world_seed": int | None, "seed": int, "size": str | None, "renderer": str, "samples": int | None,
+    "world": str, "world_seed": int | None, "up": str, "unit": str, "scale": float | None, "strict": bool,
+    "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
     "route_seed": int | None, "route_length_m": float, "encoding": str | None, "resize": float | None, "blur": float,
     "spacing_m": float, "every": int, "learning_walk_m": float, "device": str, "model": str, "threads": int | None, "step_m": float,
@@ -78,6 +80,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     from .encoding import describe_encoding
 
     eye, training, body, stopping = experiment.eye, experiment.training, experiment.body, experiment.stopping
+    reading = experiment.reading
     encoding, resize, blur = describe_encoding(experiment.encoding, eye)
     navigator, parameters = experiment.navigator, dict(experiment.navigator.parameters)
     scans = navigator.name == "scan"
@@ -85,6 +88,10 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     return {
         "world": _source(experiment.world, "world"),
         "world_seed": experiment.world_seed,
+        "up": reading.up,
+        "unit": reading.unit,
+        "scale": reading.scale,
+        "strict": reading.strict,
         "seed": experiment.seed,
         "size": f"{eye.width}x{eye.height}",
         "renderer": experiment.renderer,
@@ -176,6 +183,7 @@ def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]
     """The fields of `Surroundings`. known: the eye that a model was trained with."""
     names = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
     fields = {name: given[name] for name in names if name in given}
+    fields["reading"] = MeshReading(**_values(given, up="up", unit="unit", scale="scale", strict="strict"))
     return fields | _values(given, route_length="route_length_m") | {"eye": _eye(given, known)}
 
 

@@ -9,6 +9,7 @@ import attrs
 
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
+from tussock.world.mesh_reading import MeshReading
 from tussock.world.settings import choice, instance_of, number, settings, switch, whole
 
 if TYPE_CHECKING:
@@ -53,8 +54,9 @@ class Surroundings:
     Attributes:
         world: A preset's name (parameters may follow it), a file, or a `World`.
         world_seed: Of a generated world; None means `seed`.
+        reading: How the file of a world is read: its axis that is up, its unit, and whether losses are refused.
         cull_back_faces: Triangles are seen from their front only, as the original Sussex renderer did.
-        route: A `Route`, its file, or None to generate one.
+        route: A `Route`, its file, or None to generate one. It may be in the coordinates of the world's file; see `World.origin_m`.
         route_seed: Of a generated route; None means `seed`.
         route_length: Of a generated route (m).
         eye: What part of the sphere is seen, and how finely.
@@ -65,6 +67,7 @@ class Surroundings:
 
     world: Any = attrs.field(default="tussock-field", converter=_world)
     world_seed: int | None = whole(None, low=0, optional=True)
+    reading: MeshReading = instance_of(MeshReading, attrs.Factory(MeshReading), "a MeshReading")
     cull_back_faces: bool = switch(False)
     route: Any = attrs.field(default=None, converter=_route)
     route_seed: int | None = whole(None, low=0, optional=True)
@@ -93,17 +96,20 @@ class Surroundings:
         return attrs.evolve(self, **changes)
 
     def open_world(self) -> "World":
-        """The world. Raises InputError where its file cannot be read."""
+        """The world. Raises InputError where its file cannot be read, or where an axis or a unit is given without a file."""
         from tussock.world.files import open_world
         from tussock.world.scene import World
 
+        if isinstance(self.world, World) and self.reading.changes_coordinates:
+            raise SettingError("up, unit and scale are for files of meshes; this world is in memory: leave them out")
         seed = self.seed if self.world_seed is None else self.world_seed
-        world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed)
+        world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
         return dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
 
     def open_route(self, world: "World") -> "Route":
         """The route through the world. Raises InputError where it leaves the world, or where none is found."""
         from tussock.world.geometry import Route
+        from tussock.world.origin import local_route
         from tussock.world.route_files import read_route
         from tussock.world.routes import check_route, generate_route
 
@@ -112,6 +118,9 @@ class Surroundings:
             route = generate_route(world, seed, self.route_length)
         else:
             route = self.route if isinstance(self.route, Route) else read_route(self.route)
+            route = local_route(
+                world, route, "the route" if isinstance(self.route, Route) else f"the route {self.route}"
+            )
         check_route(world, route)
         return route
 

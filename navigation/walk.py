@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float32, UInt8
 
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
-from tussock.world.geometry import Bounds, Pose, Route, wrap_angle
+from tussock.world.geometry import Bounds, Pose, Route, place_text, wrap_angle
 
 from .body import Body
 from .encoding import Encoding
@@ -269,5 +269,5 @@ def check_inside(pose: Pose, field: Bounds) -> None:
     """Refuse a start that is outside of the world. Raises SettingError."""
     if not np.isfinite(pose).all() or not field.contains(pose.x, pose.y):
         raise SettingError(
-            f"the start ({pose.x:g}, {pose.y:g}) m is outside the world ({field}); choose another route or offset"
+            f"the start {place_text(pose.x, pose.y)} is outside the world ({field}); choose another route or offset"
         )

@@ -1,7 +1,7 @@
 """Worlds on disk: meshes through trimesh, and AntWorld `.bin`.
 
 A world saved as GLB or PLY carries its ground, sky, field, seed and parameters in the file (GLB: the scene's `extras`;
-PLY: a header comment), and reads back equal. Coordinates are metres with z up, in every format, as they are in the file.
+PLY: a header comment), and reads back equal. GLB files have y up, as the standard of glTF says; PLY files have z up.
 """
 
 import json
@@ -11,40 +11,37 @@ from typing import Any
 
 import numpy as np
 
+from .antworld import read_antworld
 from .atomic import replacing
-from .errors import FileError, InputError, first_line
-from .geometry import Bounds
-from .mesh_materials import face_rgb, texture_of
+from .axes import turned_y_up
+from .errors import FileError, InputError, SettingError
+from .file_kinds import refuse_other_kinds
+from .mesh_files import read_mesh
+from .mesh_reading import MeshReading
 from .params import WORLDS, check_preset, is_generated
-from .route_files import existing_file, naming, read_planes
-from .scene import Ground, World
-from .settings import MAX_COORDINATE
-
-KEY = "tussock"  # of the data in a file that a mesh cannot hold
-DEFAULT_SKY = (191, 191, 191)
-MAX_TRIANGLES = 10**7  # of a world; each takes a few hundred bytes while it is read
-ARCHIVES = ("zip", "bz2", "gz")  # trimesh would unpack them, whatever the size of their content
-
-# How the original program draws its worlds: green vegetation on sand (sussex/README.md has frames of it).
-ANTWORLD_TINT = (0.0, 1.0, 0.0)
-ANTWORLD_GROUND = (229, 183, 90)
+from .route_files import existing_file, naming
+from .scene import World
+from .world_data import KEY, to_json
 
 
-def open_world(name: str, seed: int = 0) -> World:
+def open_world(name: str, seed: int = 0, reading: MeshReading | None = None) -> World:
     """The world that a name stands for: generated if it is a preset (see `is_generated`), otherwise read from a file.
 
     Args:
         name: Name of a preset, which parameters may follow, or of a file.
         seed: Seed of a generated world.
+        reading: How a file is read; see `read_world`.
 
     Raises:
         InputError: Where it is neither, and where the world cannot be generated or read.
     """
     if is_generated(name):
+        if reading is not None and reading.changes_coordinates:
+            raise SettingError(f"up, unit and scale are for files of meshes; {name!r} is generated: leave them out")
         return World.generate(name, seed)
     if not Path(name).suffix:
         check_world(name)
-    return read_world(name)
+    return read_world(name, reading)
 
 
 def check_world(name: str | os.PathLike) -> None:
@@ -56,115 +53,28 @@ def check_world(name: str | os.PathLike) -> None:
         raise FileError(f"there is no world {name!r}; give one of {', '.join(WORLDS.names)}, or a file")
 
 
-def read_world(path: str | os.PathLike) -> World:
+def read_world(path: str | os.PathLike, reading: MeshReading | None = None) -> World:
     """Read a world: AntWorld `.bin`, or any mesh that trimesh reads. Files of `write_world` come back complete.
 
-    Raises FileError for a file that is missing or damaged, that has no triangles, or more than MAX_TRIANGLES.
+    What is assumed or lost is logged as a warning, with the flag that changes it.
+
+    Args:
+        path: The file.
+        reading: Which axis is up, the unit, and whether losses are refused; None is as by default.
+
+    Raises:
+        FileError: For a file that is missing or damaged or something else than a world, that has no triangles or more than
+            MAX_TRIANGLES, and, where the reading is strict, for one of which something would be lost.
     """
-    path = existing_file(path, "world")
+    path, reading = Path(path), reading or MeshReading()
+    if not os.path.isdir(path):
+        path = existing_file(path, "world")
     try:
+        refuse_other_kinds(path)
         with np.errstate(all="ignore"):  # World refuses values that are not finite
-            return _read_antworld(path) if path.suffix.lower() == ".bin" else _read_mesh(path)
+            return read_antworld(path, reading) if path.suffix.lower() == ".bin" else read_mesh(path, reading)
     except InputError as error:
         raise naming(path, error) from error
-
-
-def _read_mesh(path: Path) -> World:
-    """The world in a file that trimesh reads."""
-    import trimesh  # takes half a second, which a generated world need not wait for
-
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in trimesh.available_formats() or kind in ARCHIVES:
-        raise FileError(f"unknown kind of world {path.suffix!r}; give .glb, .ply, .obj, .stl or AntWorld .bin")
-    try:
-        if kind == "glb":
-            _check_accessors(path)
-        scene = trimesh.load_scene(path, process=False)
-        meshes = _placed_meshes(scene)
-        triangles = np.concatenate([mesh.triangles for mesh in meshes] or [np.empty((0, 3, 3))]).astype(np.float32)
-        rgb = np.concatenate([face_rgb(mesh) for mesh in meshes] or [np.empty((0, 3), np.uint8)])
-        textured = tuple(meshes) if any(texture_of(mesh) is not None for mesh in meshes) else ()
-        metadata = scene.metadata.get(KEY) if kind != "ply" else _read_ply_comment(path)
-    except InputError:
-        raise
-    except Exception as error:  # the readers of meshes and of their textures raise errors of any class
-        raise FileError(f"{path} cannot be read as a mesh ({first_line(error)[:160]}); is it complete?") from error
-    if len(triangles) == 0:
-        raise FileError(f"{path} holds no triangles; a world needs some")
-    if metadata is None:
-        corners = triangles.reshape(-1, 3)[:, :2].astype(float)
-        field = Bounds(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
-        return World(triangles=triangles, rgb=rgb, ground=None, sky_rgb=DEFAULT_SKY, field=field, textured=textured)
-    try:
-        return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(metadata))
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise FileError(
-            f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
-        ) from error
-
-
-def _check_accessors(path: Path) -> None:
-    """Refuse a GLB with accessors that claim much data and have none; trimesh would fill them with zeros."""
-    with path.open("rb") as file:
-        length = int.from_bytes(file.read(20)[12:16], "little")
-        tree = json.loads(file.read(length))
-    empty = sum(accessor["count"] for accessor in tree.get("accessors", []) if "bufferView" not in accessor)
-    if not empty <= 3 * MAX_TRIANGLES:
-        raise FileError(f"it claims {empty} corners and holds none of them; write it again")
-
-
-def _placed_meshes(scene) -> list:
-    """The meshes of a scene, each moved to its place, in the order of their names, in which they were written."""
-    places = [scene.graph[node] for node in sorted(scene.graph.nodes_geometry)]
-    faces = [len(getattr(scene.geometry[name], "faces", ())) for _, name in places]  # paths and points have none
-    if sum(faces) > MAX_TRIANGLES:  # one mesh may be in many places
-        raise FileError(f"it holds {sum(faces):,} triangles; a world has up to {MAX_TRIANGLES:,}")
-    meshes = []
-    for transform, name in (place for place, count in zip(places, faces, strict=True) if count):
-        mesh = scene.geometry[name].copy()
-        mesh.apply_transform(transform)
-        meshes.append(mesh)
-    return meshes
-
-
-def _read_ply_comment(path: Path) -> dict[str, Any] | None:
-    """The data that `write_world` put into the header of a PLY, or None."""
-    start = f"comment {KEY} ".encode("ascii")
-    with path.open("rb") as file:
-        for line in file:
-            if line.startswith(start):
-                try:
-                    return json.loads(line[len(start) :])
-                except (ValueError, RecursionError) as error:
-                    raise FileError(f"its {KEY} comment is damaged; write the world again") from error
-            if line.startswith(b"end_header"):
-                break
-    return None
-
-
-def _read_antworld(path: Path) -> World:
-    """An AntWorld `.bin`: planes x0 x1 x2 y0 y1 y2 z0 z1 z2 R G B, in green on sand as its own program draws it."""
-    planes = read_planes(path, 12, "an AntWorld world")
-    invalid = np.flatnonzero(~(np.abs(planes) <= MAX_COORDINATE).all(axis=0))
-    if len(invalid):
-        raise FileError(
-            f"triangle {invalid[0]} holds a number that is not finite, or over {MAX_COORDINATE:g}; a world needs metres and colours"
-        )
-    shade = planes[9:]
-    if shade.min() < 0 or shade.max() > 1:
-        raise FileError(
-            f"colours run from {shade.min():g} to {shade.max():g}; an AntWorld world has 0..1 (is it a world?)"
-        )
-    triangles = planes[:9].reshape(3, 3, -1).transpose(2, 1, 0)  # (xyz, corner, n) -> (n, corner, xyz)
-    rgb = np.rint(255 * shade.T * ANTWORLD_TINT).astype(np.uint8)
-    bounds = Bounds(*triangles[..., :2].min(axis=(0, 1)).tolist(), *triangles[..., :2].max(axis=(0, 1)).tolist())
-    return World(
-        triangles=np.ascontiguousarray(triangles, dtype=np.float32),
-        rgb=rgb,
-        ground=Ground(ANTWORLD_GROUND, bounds),
-        sky_rgb=DEFAULT_SKY,
-        field=bounds,
-    )
 
 
 def write_world(world: World, path: str | os.PathLike) -> None:
@@ -186,11 +96,14 @@ def write_world(world: World, path: str | os.PathLike) -> None:
 
 
 def _as_glb(world: World) -> bytes:
-    """The content of a GLB; the names of its meshes keep their order."""
+    """The content of a GLB, with y up; the names of its meshes keep their order."""
     import trimesh
 
-    scene = trimesh.Scene({f"{i:06d}": mesh for i, mesh in enumerate(world.textured or (_as_mesh(world),))})
-    scene.metadata[KEY] = _to_json(world)
+    meshes = [mesh.copy() for mesh in world.textured] or [_as_mesh(world)]
+    for mesh in meshes:
+        mesh.vertices = turned_y_up(np.asarray(mesh.vertices))
+    scene = trimesh.Scene({f"{i:06d}": mesh for i, mesh in enumerate(meshes)})
+    scene.metadata[KEY] = to_json(world)
     return bytes(scene.export(file_type="glb"))  # type: ignore[arg-type]
 
 
@@ -198,7 +111,7 @@ def _as_ply(world: World) -> bytes:
     """The content of a PLY, with a comment in its header."""
     data = bytes(_as_mesh(world).export(file_type="ply"))  # type: ignore[arg-type]
     head, first_element, rest = data.partition(b"element vertex")
-    return head + f"comment {KEY} {json.dumps(_to_json(world))}\n".encode("ascii") + first_element + rest
+    return head + f"comment {KEY} {json.dumps(to_json(world))}\n".encode("ascii") + first_element + rest
 
 
 def _as_mesh(world: World) -> Any:
@@ -209,31 +122,3 @@ def _as_mesh(world: World) -> Any:
     rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
     corners, faces = world.triangles.reshape(-1, 3), np.arange(3 * n).reshape(n, 3)
     return trimesh.Trimesh(corners, faces, vertex_colors=np.repeat(rgba, 3, axis=0), process=False)
-
-
-def _to_json(world: World) -> dict[str, Any]:
-    """What a mesh cannot hold, as JSON."""
-    return {
-        "version": 1,
-        "ground": world.ground and {"rgb": list(world.ground.rgb), "bounds": list(world.ground.bounds)},
-        "sky_rgb": list(world.sky_rgb),
-        "field": list(world.field),
-        "double_sided": world.double_sided,
-        "origin": world.origin,
-    }
-
-
-def _from_json(metadata: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of World that `_to_json` saved."""
-    if not isinstance(metadata, dict) or not isinstance(metadata["double_sided"], bool):
-        raise TypeError("it does not describe a world")
-    if metadata["version"] != 1:
-        raise FileError(f"written by a newer version ({metadata['version']})")
-    ground = metadata["ground"]
-    return {
-        "ground": ground and Ground(tuple(ground["rgb"]), Bounds(*ground["bounds"])),
-        "sky_rgb": tuple(metadata["sky_rgb"]),
-        "field": Bounds(*metadata["field"]),
-        "double_sided": metadata["double_sided"],
-        "origin": dict(metadata["origin"]),
-    }

@@ -9,6 +9,7 @@ so that behind is at both edges, ahead in the middle, and clockwise to the right
 rolls the panorama right by k columns.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
@@ -102,7 +103,21 @@ class Bounds(NamedTuple):
         return Bounds(self.x_min - margin, self.y_min - margin, self.x_max + margin, self.y_max + margin)
 
     def __str__(self) -> str:
-        return f"x {self.x_min:g}..{self.x_max:g} m, y {self.y_min:g}..{self.y_max:g} m"
+        return f"x {_span(self.x_min, self.x_max)} m, y {_span(self.y_min, self.y_max)} m"
+
+
+def place_text(x: float, y: float) -> str:
+    """A place (m) as messages give it, to the millimetre, so that it can be copied and used."""
+    return f"({round(x, 3) + 0.0:.12g}, {round(y, 3) + 0.0:.12g}) m"
+
+
+def _span(low: float, high: float) -> str:
+    """Two limits (m) to the millimetre, rounded so that what is copied lies between them; others with all digits."""
+    if abs(low) + abs(high) < 1e9:  # False for nan
+        near, far = math.ceil(low * 1000) / 1000, math.floor(high * 1000) / 1000
+        if low <= near < far <= high:
+            return f"{near + 0.0:.12g}..{far + 0.0:.12g}"
+    return f"{low + 0.0!r}..{high + 0.0!r}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from .errors import InputError, SettingError
 from .generate import seeded
-from .geometry import Bounds, Route
+from .geometry import Bounds, Route, place_text
 from .scene import World
 
 BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
@@ -68,8 +68,9 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     rng, field = seeded(seed), world.field
     length = min(float(length), 0.8 * float(np.hypot(*field.size)))
     if np.prod(field.size / CELL + 2 * MARGIN) > MAX_CELLS:
+        of_a_file = "" if world.origin else " (or the unit of the file, such as --unit mm)"
         raise InputError(
-            f"the field ({field}) is too large to look for a route in, {MAX_CELLS * CELL**2:,.0f} m2 at most; give a route"
+            f"the field ({field}) is too large to look for a route in, {MAX_CELLS * CELL**2:,.0f} m2 at most; give a route{of_a_file}"
         )
     inside = field.widened(-min(0.3, 0.05 * float(field.size.min())))
     if goal is not None:
@@ -102,7 +103,7 @@ def check_route(world: World, route: Route) -> None:
     if not inside.all():
         x, y = route.xy[~inside][0]
         raise InputError(
-            f"the route leaves the world ({world.field}) at ({x:g}, {y:g}) m; choose a route of this world"
+            f"the route leaves the world ({world.field}) at {place_text(x, y)}; choose a route of this world"
         )
 
 
@@ -112,11 +113,11 @@ def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
         raise SettingError(f"a goal at {goal!r}; give x and y (m)")
     x, y = goal
     if not (np.isfinite(goal).all() and inside.contains(x, y)):
-        raise SettingError(f"a goal at ({x:g}, {y:g}) m; choose one inside the field, off its edge ({inside})")
+        raise SettingError(f"a goal at {place_text(x, y)}; choose one inside the field, off its edge ({inside})")
     room = float(clearance(world, np.array([goal]))[0])
     if room < PREFERRED_CLEARANCE:
         raise SettingError(
-            f"the goal ({x:g}, {y:g}) m is {room:.2f} m from an obstacle; choose one that is at least {PREFERRED_CLEARANCE} m away"
+            f"the goal {place_text(x, y)} is {room:.2f} m from an obstacle; choose one that is at least {PREFERRED_CLEARANCE} m away"
         )
 
 

@@ -58,6 +58,7 @@ class World:
         double_sided: False culls back faces: a triangle is visible only from the side that (v1 - v0) x (v2 - v0) points to.
         origin: How the world was made (preset, seed, parameters); it is saved and loaded with the world.
         textured: The meshes of the file, where they have textures; the GL renderers draw these.
+        origin_m: What was subtracted from the coordinates of the file (m): they are those of the world plus this.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -68,6 +69,7 @@ class World:
     double_sided: bool = True
     origin: dict[str, Any] = dataclasses.field(default_factory=dict)
     textured: tuple[Any, ...] = ()
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
         n = len(self.triangles)
@@ -86,6 +88,8 @@ class World:
             )
         check_colour("the colour of the sky", self.sky_rgb)
         check_bounds("the field", self.field)
+        if not (len(self.origin_m) == 3 and np.isfinite(self.origin_m).all()):
+            raise SettingError(f"origin_m is {self.origin_m!r}; give three finite numbers (m)")
 
     @classmethod
     def generate(cls, params: WorldParams | str = "tussock-field", seed: int = 0) -> "World":

@@ -38,6 +38,8 @@ class DatabaseGridCommand(ViewOptions):
     """.. to here. Default: 10,10, or the world's corner where that lies farther inside."""
 
     def run(self) -> dict[str, Any]:
+        from tussock.world.origin import local_xy
+
         if not (math.isfinite(self.spacing_m) and self.spacing_m >= MIN_SPACING):
             raise SettingError(
                 f"--spacing-m {self.spacing_m:g}: give at least {MIN_SPACING:g}; names hold whole millimetres"
@@ -47,16 +49,20 @@ class DatabaseGridCommand(ViewOptions):
             for text, flag in ((self.from_m, "--from-m"), (self.to_m, "--to-m"))
         )
         world = self.surroundings().open_world()
+        low, high = (
+            corner and tuple(local_xy(world, [corner], flag)[0].tolist())
+            for corner, flag in ((low, "--from-m"), (high, "--to-m"))
+        )
         return write(self, world, self.grid(world.field, low, high), self.out)
 
     def grid(self, field: "Bounds", low: tuple[float, ...] | None, high: tuple[float, ...] | None) -> "Grid":
         """The grid from one corner to the other (m), each by default the published grid's or the field's."""
         from tussock.render.images.writing import Grid, published_grid_area
-        from tussock.world.geometry import Bounds
+        from tussock.world.geometry import Bounds, place_text
 
         for flag, corner in (("--from-m", low), ("--to-m", high)):
             if corner is not None and not field.contains(*corner):
-                raise SettingError(f"{flag} {corner[0]:g},{corner[1]:g}: that is outside the world ({field})")
+                raise SettingError(f"{flag} {place_text(*corner)}: that is outside the world ({field})")
         usual = published_grid_area(field)
         return Grid.over(Bounds(*(low or usual[:2]), *(high or usual[2:])), self.spacing_m)
 

@@ -15,6 +15,7 @@ import tyro
 
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
+from tussock.world.mesh_reading import MeshReading
 
 from ..body import Body
 from ..experiment import Experiment
@@ -65,8 +66,26 @@ class WorkerOptions(Command):
         return self.workers if self.scheduler is None else self.scheduler
 
 
+@dataclass(kw_only=True)
+class MeshOptions(Command):
+    """How the file of a world is read."""
+
+    up: str = default(MeshReading, "up")
+    """The axis of the world's file that points up: x, y or z. auto: y for glTF, as its standard says, and z for all others."""
+    unit: str = default(MeshReading, "unit")
+    """The unit of the world's file: mm, cm, m, in or ft. auto: metres."""
+    scale: float | None = default(MeshReading, "scale")
+    """Metres in one unit of the world's file, in place of --unit."""
+    strict: bool = default(MeshReading, "strict")
+    """Refuse a world of which something would be lost, such as a texture that is not found; otherwise a warning names it."""
+
+    def reading(self) -> MeshReading:
+        """How these flags read a mesh. Raises SettingError."""
+        return MeshReading(up=self.up, unit=self.unit, scale=self.scale, strict=self.strict)
+
+
 @dataclass
-class ViewOptions(Command):
+class ViewOptions(MeshOptions):
     """What world is seen, through what eye."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = default(Surroundings, "world")

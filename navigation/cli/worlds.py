@@ -10,7 +10,7 @@ import tyro
 from tussock.world.errors import FileError, SettingError
 
 from ..surroundings import Surroundings
-from .options import WORLD, Command, ViewOptions, open_renderer
+from .options import WORLD, Command, MeshOptions, ViewOptions, open_renderer
 from .terminal import message
 
 
@@ -65,7 +65,7 @@ class ViewCommand(ViewOptions):
         check_writable(self.out)
         surroundings = self.surroundings()
         world = surroundings.open_world()
-        x, y, heading_deg = self.position(world.field)
+        x, y, heading_deg = self.position(world)
         with open_renderer(surroundings, world) as renderer:
             view = renderer.render([(x, y, math.radians(heading_deg))])[0]
             backend = renderer.backend
@@ -77,18 +77,22 @@ class ViewCommand(ViewOptions):
             )
         return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
 
-    def position(self, field) -> tuple[float, float, float]:
+    def position(self, world) -> tuple[float, float, float]:
         """x, y (m) and heading (degrees) to look from."""
+        from tussock.world.origin import local_xy
+
+        field = world.field
         if self.at is None:
             return (field.x_min + field.x_max) / 2, (field.y_min + field.y_max) / 2, 90.0
-        x, y, heading_deg = numbers(self.at, "--at", "X,Y,HEADING_DEG", "5,5,90")
+        *xy, heading_deg = numbers(self.at, "--at", "X,Y,HEADING_DEG", "5,5,90")
+        x, y = local_xy(world, [xy], "--at")[0].tolist()
         if not (math.isfinite(heading_deg) and field.contains(x, y)):
             raise SettingError(f"--at {self.at}: that is outside the world ({field}); choose a position inside")
         return x, y, heading_deg
 
 
 @dataclass
-class RouteCommand(Command):
+class RouteCommand(MeshOptions):
     """Find a walkable route through a world and save it; several seeds and one goal give several routes to one place."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
@@ -107,6 +111,7 @@ class RouteCommand(Command):
 
     def run(self) -> dict[str, Any]:
         from tussock.world.atomic import check_writable
+        from tussock.world.origin import local_xy
         from tussock.world.route_files import write_route
         from tussock.world.routes import generate_route
 
@@ -115,7 +120,9 @@ class RouteCommand(Command):
         check_writable(self.out)
         check_picture(self.picture)
         goal = None if self.goal is None else numbers(self.goal, "--goal", "X,Y", "5,5")
-        world = Surroundings(world=self.world, seed=self.seed).open_world()
+        world = Surroundings(world=self.world, seed=self.seed, reading=self.reading()).open_world()
+        if goal is not None:
+            goal = tuple(local_xy(world, [goal], "--goal")[0].tolist())
         seed = self.seed if self.route_seed is None else self.route_seed
         route = generate_route(world, seed, self.length_m, goal=goal)
         write_route(route, self.out)

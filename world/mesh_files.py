@@ -1,0 +1,211 @@
+"""Meshes through trimesh: what the file means is decided here, and what is assumed or lost is said."""
+
+import io
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .axes import turned_z_up
+from .errors import FileError, InputError, first_line
+from .file_kinds import MAKE_A_MESH, head_of
+from .geometry import Bounds
+from .gltf import prepared_gltf
+from .mesh_materials import face_rgb, texture_of
+from .mesh_reading import MeshReading
+from .mesh_remarks import remarks_on_axes_and_units
+from .mesh_search import Neighbours
+from .obj import prepared_obj
+from .origin import origin_of, shown
+from .ply import prepared_ply
+from .scene import World
+from .world_data import DEFAULT_SKY, KEY, from_json, is_y_up
+
+log = logging.getLogger(__name__)
+
+MAX_TRIANGLES = 10**7  # of a world; each takes a few hundred bytes while it is read
+ARCHIVES = ("zip", "bz2", "gz")  # trimesh would unpack them, whatever the size of their content
+GLTF = ("glb", "gltf")
+
+
+@dataclass
+class MeshFile:
+    """A mesh file as trimesh is given it.
+
+    Attributes:
+        kind: What trimesh calls its format.
+        data: Its content.
+        search: Finds the files that it names.
+        own: The data of a world that tussock wrote into it, or None. Those of a glTF file are known when it is read.
+        float32: Whether its format stores coordinates with 24 bits.
+        remarks: What is not read.
+    """
+
+    kind: str
+    data: bytes
+    search: Neighbours
+    own: Any = None
+    float32: bool = False
+    remarks: list[str] = field(default_factory=list)
+
+
+def read_mesh(path: Path, reading: MeshReading) -> World:
+    """The world in a file that trimesh reads. For the arguments and errors, see `read_world`."""
+    import trimesh  # takes half a second, which a generated world need not wait for
+
+    kind = _kind(path, trimesh.available_formats())
+    file = _readable(path, lambda: _prepared(path, kind))
+    scene = _readable(
+        path,
+        lambda: trimesh.load_scene(io.BytesIO(file.data), file_type=file.kind, resolver=file.search, process=False),
+    )
+    if file.kind in GLTF:
+        file.own = scene.metadata.get(KEY)
+    meshes = _readable(path, lambda: _placed_meshes(scene))
+    if not meshes:
+        raise FileError(f"{path} holds {_other_content(scene)}")
+    _say_losses(path, file, reading)
+    up = "z"
+    if reading.up != "auto":
+        up = reading.up
+    elif file.kind in GLTF and is_y_up(file.own):
+        up = "y"
+    return _readable(path, lambda: _world(path, file, meshes, reading, up))
+
+
+def _kind(path: Path, known: set[str]) -> str:
+    """What trimesh calls the format of a file. Raises FileError for an unknown one."""
+    head = head_of(path)
+    if head.startswith(b"glTF"):
+        return "glb"
+    if head.startswith((b"ply\n", b"ply\r\n")):
+        return "ply"
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in known or kind in ARCHIVES:
+        raise FileError(f"unknown kind of world {path.suffix!r}; give .glb, .gltf, .ply, .obj, .stl or AntWorld .bin")
+    return kind
+
+
+def _readable(path: Path, read: Callable[[], Any]) -> Any:
+    """What `read` gives. Raises FileError where the file is damaged: readers of meshes and textures raise errors of any class."""
+    try:
+        return read()
+    except InputError:
+        raise
+    except Exception as error:
+        raise FileError(f"{path} cannot be read as a mesh ({first_line(error)[:160]}); is it complete?") from error
+
+
+def _prepared(path: Path, kind: str) -> MeshFile:
+    """The file as trimesh reads it rightly."""
+    search = Neighbours(path)
+    if kind in GLTF:
+        data, remarks = prepared_gltf(path, search)
+        return MeshFile("glb", data, search, float32=True, remarks=remarks)
+    if kind == "obj":
+        return MeshFile(kind, prepared_obj(path, search), search)
+    if kind == "ply":
+        data, header = prepared_ply(path)
+        return MeshFile(kind, data, search, own=header.comment(KEY), float32=header.stores_float32())
+    return MeshFile(kind, path.read_bytes(), search, float32=kind == "stl")
+
+
+def _placed_meshes(scene) -> list:
+    """The meshes of a scene, each moved to its place, in the order of their names, in which they were written."""
+    nodes = sorted((scene.graph[node][1], node) for node in scene.graph.nodes_geometry)  # a node's name may be random
+    places = [scene.graph[node] for _, node in nodes]
+    faces = [len(getattr(scene.geometry[name], "faces", ())) for _, name in places]  # paths and points have none
+    if sum(faces) > MAX_TRIANGLES:  # one mesh may be in many places
+        raise FileError(f"it holds {sum(faces):,} triangles; a world has up to {MAX_TRIANGLES:,}")
+    meshes = []
+    for transform, name in (place for place, count in zip(places, faces, strict=True) if count):
+        mesh = scene.geometry[name].copy()
+        mesh.apply_transform(transform)
+        meshes.append(mesh)
+    return meshes
+
+
+def _other_content(scene) -> str:
+    """What a scene without triangles holds, and what to do."""
+    kinds = [type(geometry).__name__ for geometry in scene.geometry.values()]
+    points = sum(len(each.vertices) for each in scene.geometry.values() if type(each).__name__ == "PointCloud")
+    if points:
+        return f"no triangles: it is a point cloud of {points:,} points; {MAKE_A_MESH}"
+    if kinds and all(kind.startswith("Path") for kind in kinds):
+        return "no triangles, only lines; give a mesh with surfaces"
+    return "no triangles; a world needs some"
+
+
+def _say_losses(path: Path, file: MeshFile, reading: MeshReading) -> None:
+    """Warn of what is not read, or refuse it."""
+    losses = [f"{name!r} {reason}" for name, reason in file.search.missing.items()] + file.remarks
+    if reading.strict and losses:
+        raise FileError(f"{path}: {'; '.join(losses)} (refused, as --strict is given)")
+    for name, reason in file.search.missing.items():
+        log.warning(f"{path}: {name!r} {reason}; its surfaces are drawn without it (--strict refuses)")
+    for remark in file.remarks:
+        log.warning(f"{path} {remark} (--strict refuses)")
+
+
+def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: str) -> World:
+    """The world of the meshes in a file, in metres with z up, near 0."""
+    corners = [np.asarray(mesh.vertices, dtype=np.float64)[mesh.faces].reshape(-1, 3) for mesh in meshes]
+    if file.own is None:
+        for remark in remarks_on_axes_and_units(corners, reading, up):
+            log.warning(f"{path}: {remark}")
+    low, high = (np.array([fold(each, axis=0) for each in corners]) for fold in (np.min, np.max))
+    low, high = (turned_z_up(each, up) * reading.metres for each in (low, high))
+    low, high = np.minimum(low, high).min(axis=0), np.maximum(low, high).max(axis=0)
+    origin = origin_of(low, high)
+    if any(origin):
+        _say_far(path, file, origin, reading.metres * float(np.abs(np.concatenate(corners)).max()))
+    for mesh in meshes:
+        mesh.vertices = turned_z_up(np.asarray(mesh.vertices, np.float64), up) * reading.metres - np.array(origin)
+    triangles = np.concatenate([mesh.triangles for mesh in meshes]).astype(np.float32)
+    rgb = np.concatenate([face_rgb(mesh) for mesh in meshes])
+    textured = tuple(meshes) if any(texture_of(mesh) is not None for mesh in meshes) else ()
+    own = _own_data(path, file.own, triangles) if file.own is not None else None
+    if own is None:
+        corners_xy = triangles.reshape(-1, 3)[:, :2].astype(float)
+        own = {
+            "ground": None,
+            "sky_rgb": DEFAULT_SKY,
+            "field": Bounds(*corners_xy.min(axis=0).tolist(), *corners_xy.max(axis=0).tolist()),
+            "origin_m": origin,
+        }
+    return World(triangles=triangles, rgb=rgb, textured=textured, **own)
+
+
+def _say_far(path: Path, file: MeshFile, origin: tuple[float, float, float], farthest: float) -> None:
+    log.warning(
+        f"{path}: its coordinates are far from 0, so its origin {shown(np.array(origin))} is subtracted; routes and places may be "
+        "given in its own coordinates or with the origin subtracted"
+    )
+    step = float(np.spacing(np.float32(farthest)))
+    if file.float32 and step > 0.001:
+        log.warning(
+            f"{path}: its format stores 32-bit numbers, which are {step:g} m apart there, so shapes are already rounded; "
+            "export it with a local origin, or as OBJ or PLY with double"
+        )
+
+
+def _own_data(path: Path, data: Any, triangles: np.ndarray) -> dict[str, Any] | None:
+    """What tussock wrote into a file; None where another program has moved its mesh since."""
+    try:
+        own = from_json(data)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise FileError(
+            f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
+        ) from error
+    bounds = own["field"].widened(max(1.0, float(own["field"].size.max())))
+    if bounds.contains(triangles[..., 0], triangles[..., 1]).any():
+        return own
+    log.warning(
+        f"{path}: its triangles are not where its {KEY} metadata says ({own['field']}); the metadata are ignored"
+    )
+    return None
