@@ -40,7 +40,8 @@ class MeshFile:
         data: Its content.
         search: Finds the files that it names.
         own: The data of a world that tussock wrote into it, or None. Those of a glTF file are known when it is read.
-        float32: Whether its format stores coordinates with 24 bits.
+        float32: Whether its format stores coordinates in 32 bits.
+        step: Between neighbouring ones of these (in units of the file); 0 where they are stored with more digits.
         remarks: What is not read.
     """
 
@@ -49,6 +50,7 @@ class MeshFile:
     search: Neighbours
     own: Any = None
     float32: bool = False
+    step: float = 0.0
     remarks: list[str] = field(default_factory=list)
 
 
@@ -65,6 +67,7 @@ def read_mesh(path: Path, reading: MeshReading) -> World:
     if file.kind in GLTF:
         file.own = scene.metadata.get(KEY)
     meshes = _readable(path, lambda: _placed_meshes(scene))
+    file.step = _readable(path, lambda: _stored_step(scene)) if file.float32 else 0.0
     if not meshes:
         raise FileError(f"{path} holds {_other_content(scene)}")
     _say_losses(path, file, reading)
@@ -161,7 +164,7 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
     low, high = np.minimum(low, high).min(axis=0), np.maximum(low, high).max(axis=0)
     origin = origin_of(low, high)
     if any(origin):
-        _say_far(path, file, origin, reading.metres * float(np.abs(np.concatenate(corners)).max()))
+        _say_far(path, origin, file.step * reading.metres)
     for mesh in meshes:
         mesh.vertices = turned_z_up(np.asarray(mesh.vertices, np.float64), up) * reading.metres - np.array(origin)
     triangles = np.concatenate([mesh.triangles for mesh in meshes]).astype(np.float32)
@@ -179,17 +182,26 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
     return World(triangles=triangles, rgb=rgb, textured=textured, **own)
 
 
-def _say_far(path: Path, file: MeshFile, origin: tuple[float, float, float], farthest: float) -> None:
+def _say_far(path: Path, origin: tuple[float, float, float], step: float) -> None:
+    """Say that a world is made local. step: between neighbouring numbers as they are stored in its file (m)."""
     log.warning(
         f"{path}: its coordinates are far from 0, so its origin {shown(np.array(origin))} is subtracted; routes and places may be "
         "given in its own coordinates or with the origin subtracted"
     )
-    step = float(np.spacing(np.float32(farthest)))
-    if file.float32 and step > 0.001:
+    if step > 0.001:
         log.warning(
             f"{path}: its format stores 32-bit numbers, which are {step:g} m apart there, so shapes are already rounded; "
             "export it with a local origin, or as OBJ or PLY with double"
         )
+
+
+def _stored_step(scene) -> float:
+    """The largest difference between neighbouring 32-bit numbers as the corners of a scene store them, in units of the scene."""
+    steps = [0.0]
+    for matrix, name in (scene.graph[node] for node in scene.graph.nodes_geometry):
+        farthest = np.abs(scene.geometry[name].vertices).max(initial=0.0)
+        steps.append(float(np.spacing(np.float32(farthest)) * np.linalg.norm(matrix[:3, :3], axis=0).max()))
+    return max(steps)
 
 
 def _own_data(path: Path, data: Any, triangles: np.ndarray) -> dict[str, Any] | None:
