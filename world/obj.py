@@ -44,11 +44,11 @@ def prepared_obj(path: Path, search: Neighbours) -> bytes:
 
 
 def _decoded(data: bytes) -> str:
-    """The text in a file: UTF-8 or UTF-16 with a mark, or Latin-1."""
+    """The text in a file: UTF-8, UTF-16 with a mark, or Latin-1."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace")
+        return data.decode("utf-16", errors="replace").lstrip("\ufeff")
     try:
-        return data.decode("utf-8-sig")
+        return data.decode().lstrip("\ufeff")
     except UnicodeDecodeError:
         return data.decode("latin-1")
 
