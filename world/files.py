@@ -4,8 +4,10 @@ A world saved as GLB or PLY carries its ground, sky, field, seed and parameters 
 PLY: a header comment), and reads back equal. Coordinates are metres with z up, in every format, as they are in the file.
 """
 
+import io
 import json
 import os
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,10 @@ import numpy as np
 from .atomic import replacing
 from .errors import FileError, InputError, first_line
 from .geometry import Bounds
-from .mesh_materials import face_rgb, texture_of
+from .gltf_materials import carry_materials
+from .mesh_export import material_writer, meshes_of
+from .mesh_materials import appearance_of
+from .obj_materials import carry_mtl
 from .params import WORLDS, check_preset, is_generated
 from .route_files import existing_file, naming, read_planes
 from .scene import Ground, World
@@ -79,11 +84,12 @@ def _read_mesh(path: Path) -> World:
     try:
         if kind == "glb":
             _check_accessors(path)
-        scene = trimesh.load_scene(path, process=False)
+        resolver = _Neighbours(path)
+        data = _carried_gltf(path) if kind in ("glb", "gltf") else path.read_bytes()
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=resolver, process=False)  # type: ignore[arg-type]
         meshes = _placed_meshes(scene)
         triangles = np.concatenate([mesh.triangles for mesh in meshes] or [np.empty((0, 3, 3))]).astype(np.float32)
-        rgb = np.concatenate([face_rgb(mesh) for mesh in meshes] or [np.empty((0, 3), np.uint8)])
-        textured = tuple(meshes) if any(texture_of(mesh) is not None for mesh in meshes) else ()
+        rgb, texturing = appearance_of(meshes, path, resolver.get)
         metadata = scene.metadata.get(KEY) if kind != "ply" else _read_ply_comment(path)
     except InputError:
         raise
@@ -94,13 +100,43 @@ def _read_mesh(path: Path) -> World:
     if metadata is None:
         corners = triangles.reshape(-1, 3)[:, :2].astype(float)
         field = Bounds(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
-        return World(triangles=triangles, rgb=rgb, ground=None, sky_rgb=DEFAULT_SKY, field=field, textured=textured)
+        return World(triangles=triangles, rgb=rgb, ground=None, sky_rgb=DEFAULT_SKY, field=field, texturing=texturing)
     try:
-        return World(triangles=triangles, rgb=rgb, textured=textured, **_from_json(metadata))
+        return World(triangles=triangles, rgb=rgb, texturing=texturing, **_from_json(metadata))
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise FileError(
             f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
         ) from error
+
+
+def _carried_gltf(path: Path) -> bytes:
+    """A glTF file with its materials written so that trimesh keeps them."""
+    data = path.read_bytes()
+    if path.suffix.lower() == ".gltf":
+        tree = json.loads(data)
+        carry_materials(tree)
+        return json.dumps(tree).encode()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    carry_materials(tree)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + length :]
+    return b"".join([data[:8], struct.pack("<II", 20 + len(text) + len(rest), len(text)), data[16:20], text, rest])
+
+
+class _Neighbours:
+    """The files next to a mesh, as trimesh asks for them."""
+
+    def __init__(self, path: Path):
+        self._folder = path.parent
+
+    def get(self, name: str) -> bytes:
+        """The content of a file. Raises OSError."""
+        data = (self._folder / name.strip()).read_bytes()
+        return carry_mtl(data) if name.strip().lower().endswith(".mtl") else data
+
+    __getitem__ = get
 
 
 def _check_accessors(path: Path) -> None:
@@ -176,7 +212,7 @@ def write_world(world: World, path: str | os.PathLike) -> None:
     suffix = path.suffix.lower()
     if suffix not in (".glb", ".ply"):
         raise FileError(f"{path}: a world is written as .glb or .ply, not {suffix or 'a name without a suffix'!r}")
-    if suffix == ".ply" and world.textured:
+    if suffix == ".ply" and world.texturing is not None:
         raise FileError(f"{path}: a .ply cannot hold the textures of this world; write it as .glb")
     if len(world.triangles) == 0:
         raise FileError(f"{path}: this world holds no triangles; there is nothing to write")
@@ -189,26 +225,17 @@ def _as_glb(world: World) -> bytes:
     """The content of a GLB; the names of its meshes keep their order."""
     import trimesh
 
-    scene = trimesh.Scene({f"{i:06d}": mesh for i, mesh in enumerate(world.textured or (_as_mesh(world),))})
+    scene = trimesh.Scene(meshes_of(world))
     scene.metadata[KEY] = _to_json(world)
-    return bytes(scene.export(file_type="glb"))  # type: ignore[arg-type]
+    return bytes(scene.export(file_type="glb", tree_postprocessor=material_writer(world)))  # type: ignore[arg-type]
 
 
 def _as_ply(world: World) -> bytes:
     """The content of a PLY, with a comment in its header."""
-    data = bytes(_as_mesh(world).export(file_type="ply"))  # type: ignore[arg-type]
+    (mesh,) = meshes_of(world).values()
+    data = bytes(mesh.export(file_type="ply"))  # type: ignore[arg-type]
     head, first_element, rest = data.partition(b"element vertex")
     return head + f"comment {KEY} {json.dumps(_to_json(world))}\n".encode("ascii") + first_element + rest
-
-
-def _as_mesh(world: World) -> Any:
-    """A trimesh mesh of the triangles, which share no corners; each corner has the colour of its triangle."""
-    import trimesh
-
-    n = len(world.triangles)
-    rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
-    corners, faces = world.triangles.reshape(-1, 3), np.arange(3 * n).reshape(n, 3)
-    return trimesh.Trimesh(corners, faces, vertex_colors=np.repeat(rgba, 3, axis=0), process=False)
 
 
 def _to_json(world: World) -> dict[str, Any]:

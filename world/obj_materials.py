@@ -1,0 +1,136 @@
+"""Materials of OBJ files (MTL), as trimesh keeps them: Kd, map_Kd with its options, map_d, d and Tr."""
+
+import io
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .materials import Material
+
+_KEY = "tussock_map_kd"  # of a line that `carry_mtl` adds
+# Options of a map, with the number of their arguments; a pair is the least and the greatest number.
+_OPTIONS = {
+    "-blendu": 1, "-blendv": 1, "-boost": 1, "-bm": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2, "-texres": 1, "-type": 1,
+    "-colorspace": 1, "-o": (1, 3), "-s": (1, 3), "-t": (1, 3),
+}  # fmt: skip
+
+
+def carry_mtl(content: bytes) -> bytes:
+    """An MTL file in which map_Kd names only the file; the options stand in a line that trimesh keeps."""
+    lines = []
+    for line in content.decode("utf-8", errors="surrogateescape").splitlines():
+        key, _, rest = line.strip().partition(" ")
+        if key.lower() == "map_kd":
+            options, name = split_map(rest)
+            lines += [f"{_KEY} {json.dumps([name, options], separators=(',', ':'))}", f"map_Kd {name}"]
+        else:
+            lines.append(line)
+    return "\n".join(lines).encode("utf-8", errors="surrogateescape")
+
+
+def split_map(text: str) -> tuple[dict[str, list[str]], str]:
+    """The options of a map and the name of its file, which may hold spaces."""
+    options: dict[str, list[str]] = {}
+    rest = text.strip()
+    while rest:
+        option, _, after = rest.partition(" ")
+        if option.lower() not in _OPTIONS:
+            break
+        counts = _OPTIONS[option.lower()]
+        least, most = counts if isinstance(counts, tuple) else (counts, counts)
+        words = after.split()
+        count = least
+        while count < most and count < len(words) - 1 and _is_number(words[count]):
+            count += 1
+        options[option.lower()] = words[:count]
+        for _ in range(count):
+            after = after.strip().partition(" ")[2]
+        rest = after.strip()
+    return options, rest
+
+
+def obj_material(simple: Any, get: Callable[[str], bytes] | None) -> Material:
+    """The material of a mesh from a `SimpleMaterial` of trimesh.
+
+    Args:
+        simple: The material.
+        get: Gives the content of a file next to the mesh, or raises OSError.
+    """
+    keys, image = simple.kwargs, simple.image
+    if image is not None and image.format is None:  # trimesh made it, in place of a material file that is missing
+        image = None
+    options = json.loads("".join(keys[_KEY]))[1] if _KEY in keys else {}
+    red, green, blue = _colour(simple, image)
+    alpha_image, lost = None, [f"option {name} of its texture" for name in ("-mm", "-t") if name in options]
+    if "map_d" in keys and image is not None:
+        alpha_image = _image(split_map(" ".join(keys["map_d"]))[1], get)
+        lost += [] if alpha_image is not None else [f"map_d {' '.join(keys['map_d'])}, which is not found"]
+    clamp = options.get("-clamp", ["off"])[0].lower() == "on"
+    return Material(
+        name=str(simple.name),
+        image=image,
+        alpha_image=alpha_image,
+        key=(simple.name,) if _is_mtl(keys) else None,
+        factor=np.clip([red, green, blue, _opacity(keys)], 0, 1),
+        wrap=("clamp", "clamp") if clamp else ("repeat", "repeat"),
+        alpha="blend",
+        transform=_transform(options),
+        lost=tuple(lost),
+    )
+
+
+def _colour(simple: Any, image: Any) -> np.ndarray:
+    """What the texture, or white, is multiplied by (0..1)."""
+    keys = simple.kwargs
+    if image is None:
+        return np.broadcast_to(keys.get("kd", np.asarray(simple.diffuse[:3]) / 255), 3)
+    kd = np.broadcast_to(keys.get("kd", 1.0), 3)
+    # Black, and the colours of trimesh's default material, are written by programs that do not multiply by them.
+    never_meant = not kd.any() or all(np.allclose(keys.get(key, 0), 0.4) for key in ("kd", "ka", "ks"))
+    return np.ones(3) if never_meant else kd
+
+
+def _is_mtl(keys: dict[str, Any]) -> bool:
+    """Whether a material was in an MTL file, of which trimesh keeps what it does not use."""
+    return bool(keys)
+
+
+def _opacity(keys: dict[str, Any]) -> float:
+    """1 is opaque. A material that would be invisible is opaque: programs that mix `d` and `Tr` up write 0 for all."""
+    try:
+        opacity = float(keys["d"][-1]) if "d" in keys else 1 - float(keys["tr"][-1]) if "tr" in keys else 1.0
+    except (ValueError, IndexError):
+        return 1.0
+    return opacity if opacity > 0 else 1.0
+
+
+def _transform(options: dict[str, list[str]]) -> np.ndarray:
+    """-s and -o as a matrix for (u, v, 1) with v down: u s + o, and likewise v, which goes up in MTL."""
+    su, sv = _pair(options.get("-s", []), 1.0)
+    ou, ov = _pair(options.get("-o", []), 0.0)
+    return np.array([(su, 0, ou), (0, sv, 1 - sv - ov)], dtype=float)
+
+
+def _pair(words: list[str], default: float) -> tuple[float, float]:
+    u, v, *_ = [*(float(word) for word in words), default, default]
+    return u, v
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _image(name: str, get: Callable[[str], bytes] | None) -> Any:
+    """An image next to the mesh, or None where it is not found or is not an image."""
+    from PIL import Image
+
+    try:
+        return None if get is None else Image.open(io.BytesIO(get(name)))
+    except OSError:
+        return None
