@@ -84,7 +84,7 @@ def _carried(tree: dict[str, Any], material: dict[str, Any]) -> dict[str, Any]:
         "wrap": [_WRAPS[sampler.get(key, 10497)] for key in ("wrapS", "wrapT")],
         "filter": "nearest" if nearest else "linear",
         "alpha": {"MASK": "mask", "BLEND": "blend"}.get(material.get("alphaMode", "OPAQUE"), "opaque"),
-        "cutoff": float(material.get("alphaCutoff", 0.5)),
+        "cutoff": float(material.get("alphaCutoff", 0.5)) if material.get("alphaMode") == "MASK" else 0.5,
         "texcoord": int(transform.get("texCoord", texture.get("texCoord", 0) if texture else 0)),
         "transform": _transform(transform).tolist(),
         "lost": _lost(material),
@@ -104,7 +104,7 @@ def _lost(material: dict[str, Any]) -> list[str]:
     """What is seen in other programs and not here."""
     lost = [text for name, text in _SEEN_EXTENSIONS.items() if name in material.get("extensions", {})]
     if any(material.get("emissiveFactor", ())):
-        lost.append("emissive")
+        lost.append("emissive light")
     return lost
 
 

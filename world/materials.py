@@ -88,11 +88,18 @@ def rgba_of(image: Any, name: str) -> UInt8[np.ndarray, "h w 4"]:
         raise FileError(f"the texture of {name!r} is damaged ({error}); copy or export it again") from error
 
 
+def white_image(size: tuple[int, int]) -> Any:
+    """A white PIL image."""
+    from PIL import Image
+
+    return Image.new("L", size, 255)
+
+
 def _grey(values: UInt8[np.ndarray, "h w"]) -> UInt8[np.ndarray, "h w 4"]:
     return np.stack([values, values, values, np.full_like(values, 255)], axis=-1)
 
 
-def _with_alpha(texels: UInt8[np.ndarray, "h w 4"], image: Any, name: str) -> UInt8[np.ndarray, "h w 4"]:
+def _with_alpha(texels: UInt8[np.ndarray, "h w 4"], image: Any, name: str) -> UInt8[np.ndarray, "height width 4"]:
     """Texels with the alpha of another image: its alpha channel, or its brightness where it has none or a full one."""
     other = rgba_of(image, name)
     alpha = other[..., 3] if other[..., 3].min() < 255 else np.asarray(image.convert("L"))

@@ -133,7 +133,7 @@ def _covering(mesh: Any, path: Path, get: Callable[[str], bytes] | None) -> _Cov
         if material.image is None or UV not in attributes:
             return _Covering(material, material.times(colours))
         return _Covering(material, colours, _corners_uv(attributes[UV], faces, material))
-    material = obj_material(visual.material, get)
+    material = obj_material(visual.material, get) if hasattr(visual.material, "kwargs") else _other(visual.material)
     coloured = len(attributes.get("color", ())) == len(mesh.vertices)
     if material.image is not None and visual.uv is not None:
         if coloured:
@@ -143,6 +143,12 @@ def _covering(mesh: Any, path: Path, get: Callable[[str], bytes] | None) -> _Cov
         material = replace(material, factor=np.array([1, 1, 1, material.factor[3]]))
         return _Covering(material, material.times(_display_bytes(attributes["color"], linear=False)[faces]))
     return _Covering(material, material.times(white))
+
+
+def _other(material: Any) -> Material:
+    """The material of another format, as far as trimesh knows it."""
+    factor = np.asarray(material.main_color, dtype=float) / 255
+    return Material(image=getattr(material, "baseColorTexture", None), factor=factor, linear=True, alpha="blend")
 
 
 def _display_bytes(colours: Any, *, linear: bool) -> UInt8[np.ndarray, "n 4"]:

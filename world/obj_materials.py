@@ -1,15 +1,13 @@
 """Materials of OBJ files (MTL), as trimesh keeps them: Kd, map_Kd with its options, map_d, d and Tr."""
 
 import io
-import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .materials import Material
+from .materials import Material, white_image
 
-_KEY = "tussock_map_kd"  # of a line that `carry_mtl` adds
 # Options of a map, with the number of their arguments; a pair is the least and the greatest number.
 _OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-boost": 1, "-bm": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2, "-texres": 1, "-type": 1,
@@ -18,13 +16,14 @@ _OPTIONS = {
 
 
 def carry_mtl(content: bytes) -> bytes:
-    """An MTL file in which map_Kd names only the file; the options stand in a line that trimesh keeps."""
+    """An MTL file in which maps name only their files; an option such as -clamp stands in a line of its own, which trimesh keeps."""
     lines = []
     for line in content.decode("utf-8", errors="surrogateescape").splitlines():
         key, _, rest = line.strip().partition(" ")
-        if key.lower() == "map_kd":
+        if key.lower() in ("map_kd", "map_d"):
             options, name = split_map(rest)
-            lines += [f"{_KEY} {json.dumps([name, options], separators=(',', ':'))}", f"map_Kd {name}"]
+            lines.append(f"{key} {name}")
+            lines += [f"{key.lower()}{option} {' '.join(values)}" for option, values in options.items()]
         else:
             lines.append(line)
     return "\n".join(lines).encode("utf-8", errors="surrogateescape")
@@ -61,12 +60,14 @@ def obj_material(simple: Any, get: Callable[[str], bytes] | None) -> Material:
     keys, image = simple.kwargs, simple.image
     if image is not None and image.format is None:  # trimesh made it, in place of a material file that is missing
         image = None
-    options = json.loads("".join(keys[_KEY]))[1] if _KEY in keys else {}
+    options = {key.removeprefix("map_kd"): values for key, values in keys.items() if key.startswith("map_kd-")}
     red, green, blue = _colour(simple, image)
-    alpha_image, lost = None, [f"option {name} of its texture" for name in ("-mm", "-t") if name in options]
-    if "map_d" in keys and image is not None:
-        alpha_image = _image(split_map(" ".join(keys["map_d"]))[1], get)
-        lost += [] if alpha_image is not None else [f"map_d {' '.join(keys['map_d'])}, which is not found"]
+    alpha_image, lost = None, [f"option {name} of a texture" for name in ("-mm", "-t") if name in options]
+    if "map_d" in keys:
+        alpha_image = _image(" ".join(keys["map_d"]), get)
+        if image is None and alpha_image is not None:
+            image = white_image(alpha_image.size)
+        lost += [] if alpha_image is not None else [f"the holes in {' '.join(keys['map_d'])!r}, which cannot be read"]
     clamp = options.get("-clamp", ["off"])[0].lower() == "on"
     return Material(
         name=str(simple.name),
