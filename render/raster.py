@@ -2,20 +2,22 @@
 
 pyrender uploads the world once and draws it, textures included. It draws into a framebuffer of ours: its own takes four samples for
 each pixel, which mixes colours on edges as no exact renderer does, and always reads the depth back. The depth is reversed, which
-keeps far surfaces apart whatever the near plane is (gl.Framebuffer, Camera).
+keeps far surfaces apart whatever the near plane is (gl.Framebuffer, Camera). It draws with shaders of ours: its own do not leave out
+the holes in textures. Textures have no mipmaps, so that each pixel of a face is the texel that a ray would find.
 
 Only this module imports pyrender, and only when a renderer is opened: the import binds PyOpenGL to one platform for good.
 """
 
 import weakref
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import InputError, SettingError
-from tussock.world.mesh_materials import face_rgb, texture_factor, texture_of
 from tussock.world.scene import World
+from tussock.world.textures import Texturing
 
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
@@ -27,8 +29,6 @@ NEAR = 1e-4  # m; surfaces closer to the eye are not drawn. There is no far limi
 
 class RasterRenderer:
     """Panoramas by OpenGL, a `Renderer`.
-
-    Textures are drawn in their colours, without their alpha: a leaf cut out of a rectangle by alpha shows the rectangle.
 
     Args:
         world: The world.
@@ -47,12 +47,15 @@ class RasterRenderer:
         self._cubemap = Cubemap(eye, face_size or face_size_for(eye))
         self._context = open_context(backend)
         import pyrender
+        from pyrender.shader_program import ShaderProgramCache
 
         self._flags = pyrender.RenderFlags.FLAT
         self._scene, self._camera = _scene(world)
         with self._context:
             self._framebuffer = Framebuffer(self._cubemap.size, self._cubemap.rows)
+            _check_sizes(world.texturing)
             self._pyrender = pyrender.Renderer(self._cubemap.size, self._cubemap.size)
+        self._pyrender._program_cache = ShaderProgramCache(shader_dir=str(Path(__file__).parent / "shaders"))
         self._atlas = np.empty((self._cubemap.rows, self._cubemap.size, 4), dtype=np.uint8)
         # Runs when the renderer is closed, deleted, or at exit, while the context exists; pyrender's own clean-up comes too late.
         self._free = weakref.finalize(self, _free, self._context, self._pyrender, self._framebuffer)
@@ -119,12 +122,15 @@ def _scene(world: World) -> tuple[Any, Any]:
             return np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, NEAR), (0, 0, -1, 0)], dtype=float)
 
     scene = pyrender.Scene(bg_color=[*(c / 255 for c in world.sky_rgb), 0.0])
-    primitives = [_textured(mesh, world.double_sided) for mesh in world.textured]
     triangles, rgb = world.surfaces()
-    if world.textured:  # these meshes are all triangles of the world, so only the ground remains
-        triangles, rgb = triangles[len(world.triangles) :], rgb[len(world.triangles) :]
+    primitives = []
+    if world.texturing is not None:
+        primitives = _textured(world.triangles, world.texturing, world.double_sided)
+        plain = np.ones(len(triangles), dtype=bool)  # and the ground
+        plain[: len(world.triangles)] = (world.texturing.index < 0) & (world.texturing.colours is None)
+        triangles, rgb = triangles[plain], rgb[plain]
     if len(triangles):
-        primitives.append(_coloured(triangles, rgb, world.double_sided))
+        primitives.append(_coloured(triangles, np.repeat(rgb, 3, axis=0), world.double_sided))
     if primitives:
         scene.add(pyrender.Mesh(primitives))
     camera = pyrender.Node(camera=Camera(znear=NEAR), matrix=np.eye(4))
@@ -132,34 +138,66 @@ def _scene(world: World) -> tuple[Any, Any]:
     return scene, camera
 
 
-def _coloured(triangles: Float[np.ndarray, "n 3 3"], rgb: UInt8[np.ndarray, "n 3"], double_sided: bool) -> Any:
-    """A pyrender primitive of triangles that have one colour each."""
+def _coloured(triangles: Float[np.ndarray, "n 3 3"], colours: UInt8[np.ndarray, "m c"], double_sided: bool) -> Any:
+    """A pyrender primitive of triangles without a texture; (3 n, 3) or (3 n, 4) colours of their corners."""
     import pyrender
 
     return pyrender.Primitive(
         positions=triangles.reshape(-1, 3),
-        color_0=np.repeat(rgb, 3, axis=0),
+        color_0=colours,
         material=pyrender.MetallicRoughnessMaterial(alphaMode="OPAQUE", doubleSided=double_sided),
     )
 
 
-def _textured(mesh: Any, double_sided: bool) -> Any:
-    """A pyrender primitive of a trimesh mesh with its texture, or with its colours where it has no texture."""
+def _textured(triangles: Float[np.ndarray, "n 3 3"], texturing: Texturing, double_sided: bool) -> list[Any]:
+    """Pyrender primitives, one for each texture, and one for the triangles that have corner colours only."""
     import pyrender
+    from pyrender.constants import GLTF
 
-    image = texture_of(mesh)
-    if image is None:
-        return _coloured(mesh.triangles, face_rgb(mesh), double_sided)
-    texels = np.array(image.convert("RGBA"))
-    texels[..., 3] = 255  # alpha is the share of a pixel that is covered, and a textured triangle covers it
-    return pyrender.Primitive(
-        positions=mesh.triangles.reshape(-1, 3),
-        texcoord_0=mesh.visual.uv[mesh.faces].reshape(-1, 2),
-        material=pyrender.MetallicRoughnessMaterial(
-            baseColorFactor=(*texture_factor(mesh).tolist(), 1.0),
-            # Without a sampler pyrender takes mipmaps with trilinear filtering, repeating.
-            baseColorTexture=pyrender.Texture(source=texels, source_channels="RGBA"),
+    wraps = {"repeat": GLTF.REPEAT, "mirror": GLTF.MIRRORED_REPEAT, "clamp": GLTF.CLAMP_TO_EDGE}
+    filters = {"nearest": GLTF.NEAREST, "linear": GLTF.LINEAR}
+    primitives, colours = [], texturing.colours
+    if colours is not None and (texturing.index < 0).any():
+        alone = texturing.index < 0
+        primitives.append(_coloured(triangles[alone], colours[alone].reshape(-1, 4), double_sided))
+    for number, texture in enumerate(texturing.textures):
+        chosen = texturing.index == number
+        if not chosen.any() or texture.threshold > 255:
+            continue
+        kind, (across, down) = filters[texture.filter], (wraps[wrap] for wrap in texture.wrap)
+        sampler = pyrender.Sampler(magFilter=kind, minFilter=kind, wrapS=across, wrapT=down)
+        material = pyrender.MetallicRoughnessMaterial(
+            baseColorFactor=(
+                1.0,
+                1.0,
+                1.0,
+                texture.threshold / 255,
+            ),  # what our shader takes as the least alpha that is seen
+            baseColorTexture=pyrender.Texture(source=texture.rgba, source_channels="RGBA", sampler=sampler),
             alphaMode="OPAQUE",
             doubleSided=double_sided,
-        ),
-    )
+        )
+        uv = texturing.uv[chosen].reshape(-1, 2)
+        primitives.append(
+            pyrender.Primitive(
+                positions=triangles[chosen].reshape(-1, 3),
+                texcoord_0=np.column_stack([uv[:, 0], 1 - uv[:, 1]]),  # pyrender's go up
+                color_0=None if colours is None else colours[chosen].reshape(-1, 4),
+                material=material,
+            )
+        )
+    return primitives
+
+
+def _check_sizes(texturing: Texturing | None) -> None:
+    """Refuse textures that are larger than OpenGL allows here. The context must be current. Raises SettingError."""
+    from OpenGL import GL
+
+    limit: Any = GL.glGetIntegerv(GL.GL_MAX_TEXTURE_SIZE)
+    for texture in () if texturing is None else texturing.textures:
+        height, width = texture.rgba.shape[:2]
+        if max(width, height) > limit:
+            raise SettingError(
+                f"a texture of the world has {width} x {height} pixels, and this OpenGL allows {limit}; "
+                f"make it smaller, or use the cpu renderer"
+            )

@@ -15,7 +15,10 @@ The mathematics, for an eye at the origin. All rays of a column have the same az
   box is left out where no ray meets its outline (taken slightly too wide), or where each pixel that it may touch shows something
   nearer than its nearest corner. This changes no pixel, and the cost grows far more slowly than the number of triangles.
 
-Nothing is projected or interpolated: each pixel is what a ray caster finds. The loops are in scanline_kernels.py.
+- Textures. Where a ray meets a triangle with a texture, the texel there gives its colour; a triangle with holes is nearer than
+  what lies behind it only for rays that meet no hole.
+
+Nothing is projected or interpolated: each pixel is what a ray caster finds. The loops are in scanline_kernels.py and colour_kernels.py.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +31,9 @@ from jaxtyping import Float
 from tussock.world.errors import InputError, SettingError
 from tussock.world.geometry import column_azimuths
 from tussock.world.scene import World
+from tussock.world.textures import WRAPS, product_table
 
+from .colour_kernels import PLAIN
 from .cores import core_count
 from .eye import Eye
 from .poses import Poses, Views, as_poses
@@ -85,6 +90,72 @@ class Paint(NamedTuple):
     weights: np.ndarray
 
 
+class Lookup(NamedTuple):
+    """Where rays find their colours in a textured world. The first arrays are by label, that of the sky first.
+
+    Attributes:
+        corners: (n + 1, 3, 3) of the triangles (m).
+        index: (n + 1,) the texture; -1 for corner colours alone, PLAIN for one colour.
+        holes: (n + 1,) whether some rays may pass through the triangle.
+        uv: (n + 1, 3, 2) texture coordinates.
+        corner_colours: (n + 1, 3, 4) see `Texturing`; (0, 3, 4) where there are none.
+        texels: (texels,) of all textures, row by row: red, green, blue and alpha in 8 bits each, red lowest.
+        textures: (k, 6) for each texture: where its texels begin, width, height, wrap across and down (index in WRAPS), and
+            whether its texels are mixed.
+        thresholds: (k,) `Texture.threshold`.
+        products: `product_table`.
+    """
+
+    corners: np.ndarray
+    index: np.ndarray
+    holes: np.ndarray
+    uv: np.ndarray
+    corner_colours: np.ndarray
+    texels: np.ndarray
+    textures: np.ndarray
+    thresholds: np.ndarray
+    products: np.ndarray
+
+    @classmethod
+    def of(cls, world: World) -> "Lookup | None":
+        """That of a world; None if it has no textures."""
+        texturing = world.texturing
+        if texturing is None:
+            return None
+        triangles, _ = world.surfaces()
+
+        def by_label(values: np.ndarray, plain: int) -> np.ndarray:
+            """Those of the triangles, the ground, and the sky, in the order of their labels."""
+            rest = np.full((len(triangles) + 1 - len(values), *values.shape[1:]), plain, values.dtype)
+            return np.ascontiguousarray(np.concatenate([values, rest])[::-1])
+
+        colours, textures = texturing.colours, texturing.textures
+        starts = np.cumsum([0] + [texture.rgba.shape[0] * texture.rgba.shape[1] for texture in textures])
+        table = [
+            (
+                start,
+                texture.rgba.shape[1],
+                texture.rgba.shape[0],
+                *map(WRAPS.index, texture.wrap),
+                texture.filter == "linear",
+            )
+            for start, texture in zip(starts, textures, strict=False)
+        ]
+        return cls(
+            corners=by_label(triangles, 0),
+            index=by_label(
+                np.where((texturing.index < 0) & (colours is None), PLAIN, texturing.index).astype(np.int32), PLAIN
+            ),
+            holes=by_label(texturing.may_have_holes(), 0),
+            uv=by_label(texturing.uv, 0),
+            corner_colours=np.empty((0, 3, 4), np.uint8) if colours is None else by_label(colours, 0),
+            texels=np.concatenate([np.empty(0, "<u4"), *(texture.rgba.view("<u4").ravel() for texture in textures)]),
+            textures=np.array(table, dtype=np.int64).reshape(-1, 6),
+            thresholds=np.array([texture.threshold for texture in textures]),
+            products=product_table(),
+        )
+
+
 class ScanlineRenderer:
     """Exact panoramas on the CPU, a `Renderer`. The views do not depend on the number of threads.
 
@@ -112,7 +183,8 @@ class ScanlineRenderer:
         colours = np.vstack([[*world.sky_rgb, 0], covered]).astype("<u2").view("<i8")[:, 0]
         weights = np.cos(elevations).reshape(eye.height, eye.rays)
         paint = Paint(colours, weights / weights.sum(axis=1, keepdims=True) / eye.rays)
-        self._scene = tuple(triangles), tuple(rays), tuple(paint)
+        lookup = Lookup.of(world)
+        self._scene = tuple(triangles), tuple(rays), tuple(paint), lookup and tuple(lookup)
         self._scratch: list[np.ndarray] = []  # memory for the keys of rays that no thread is using
         self._threads = threads or core_count()
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(self._threads)

@@ -1,13 +1,15 @@
 """The loops of the CPU renderer. Their mathematics is in scanline.py.
 
-All of them stand in one file, because numba's cache notices a change in the file of a function, but not in the files of those
-that it calls. Arrays are passed on one by one, because numba counts the references to each array of a tuple.
+They stand in one file, because numba's cache notices a change in the file of a function, but not in the files of those that it
+calls; colour_kernels.py has what makes colours of their keys. `lookup` is None in a plain world: numba compiles the loops anew for
+it, without the parts for textures. Arrays are passed on one by one, because numba counts the references to each array of a tuple.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from .colour_kernels import average, colour_rays, column_weights, opaque
 from .compile import compiled
 
 LEAF = 32  # triangles in a box of the lowest level; the fastest of 16 to 64
@@ -129,7 +131,7 @@ def _key(nearness, label):
 
 
 @compiled(error_model="numpy")
-def _draw_spans(count, pairs, spans, tangents, view, keys):
+def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
     """Draw `count` spans of rows, see `_draw`."""
     lows, highs, bases, slopes, first_rows, last_rows = spans[0], spans[1], spans[2], spans[3], spans[4], spans[5]
     pad, height = 1e-6 + _ATAN_ERROR * view.rows_per_rad, view.height
@@ -145,6 +147,15 @@ def _draw_spans(count, pairs, spans, tangents, view, keys):
             first += 1
         while last >= 0 and tangents[np.uintp(last)] < low:
             last -= 1
+        if lookup is not None:  # noqa: SIM102 (numba leaves the inner part out where lookup is None)
+            if lookup[2][np.uintp(label)]:  # it has holes
+                weights = column_weights(lookup, label, view, directions[0, j], directions[1, j])
+                for row in range(first, last + 1):
+                    r = np.uintp(row)
+                    key = _key(base + slope * tangents[r], label)
+                    if key > keys[j, r] and opaque(lookup, label, weights, tangents[r]):
+                        keys[j, r] = key
+                continue
         for row in range(first, last + 1):
             r = np.uintp(row)
             keys[j, r] = max(keys[j, r], _key(base + slope * tangents[r], label))
@@ -201,7 +212,7 @@ def _squared_distance(boxes, k, view):
 
 
 @compiled(error_model="numpy")
-def _draw(triangles, directions, tangents, view, keys):
+def _draw(triangles, directions, tangents, view, keys, lookup):
     """Draw all triangles. Boxes are visited from near to far, so that near ones hide far ones.
 
     directions: (2, width) cosines and sines of the azimuths of the columns in the world. Spans are collected and drawn together; each has
@@ -247,48 +258,25 @@ def _draw(triangles, directions, tangents, view, keys):
                 spans[0, count], spans[1, count], spans[2, count], spans[3, count] = low, high, gx * cos + gy * sin, gz
                 count += (low <= high) & (wrapped >= start) & (wrapped < stop)
                 if count == _SPANS:
-                    _draw_spans(count, pairs, spans, tangents, view, keys)
+                    _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
                     count = 0
-        _draw_spans(count, pairs, spans, tangents, view, keys)
+        _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
 
 
 @compiled
-def _average(keys, n, colours, weights, start, stop, pixels):
-    """Average the n x n rays of each pixel of columns start..stop-1 by solid angle, into pixels (height, width)."""
-    for block in range(start, stop, 16):  # columns whose pixels share a line of memory
-        for row in range(pixels.shape[0]):
-            for column in range(block, min(block + 16, stop)):
-                if n == 1:
-                    total = colours[np.uintp(keys[np.uintp(column), np.uintp(row)] & 0xFFFFFFFF)]
-                    red, green, blue, alpha = total & 0xFF, total >> 16 & 0xFF, total >> 32 & 0xFF, total >> 48
-                else:
-                    r = g = b = a = 0.5
-                    for y in range(n):
-                        total = 0
-                        for x in range(n):
-                            label = keys[np.uintp(column * n + x), np.uintp(row * n + y)] & 0xFFFFFFFF
-                            total += colours[np.uintp(label)]
-                        weight = weights[row, y]
-                        r += weight * (total & 0xFFFF)
-                        g += weight * (total >> 16 & 0xFFFF)
-                        b += weight * (total >> 32 & 0xFFFF)
-                        a += weight * (total >> 48)
-                    red, green, blue, alpha = np.int64(r), np.int64(g), np.int64(b), np.int64(a)
-                pixels[np.uintp(row), np.uintp(column)] = np.uint32(red | green << 8 | blue << 16 | alpha << 24)
-
-
-@compiled
-def draw_views(triangles, rays, paint, poses, start, stop, keys, views):
+def draw_views(triangles, rays, paint, lookup, poses, start, stop, keys, views):
     """Draw columns start..stop-1 of views.
 
     Args:
         triangles, rays, paint: `Triangles`, `Rays` and `Paint` as plain tuples, which numba accepts faster.
+        lookup: `Lookup` likewise; None in a plain world.
         poses: (n, 3) x (m), y (m) and heading (rad).
         start, stop: Columns of pixels.
         keys: (width, height) of rays, int64, to work in: the `_key` of the nearest triangle so far, 0 for the sky.
         views: (n, height, width) of pixels, which become red, green, blue and alpha in 8 bits each, red lowest.
     """
     azimuths, tangents, top, rows_per_rad, z, n = rays
+    colours, weights = paint
     width, height = keys.shape
     directions = np.empty((2, width))
     for i in range(len(poses)):
@@ -296,5 +284,9 @@ def draw_views(triangles, rays, paint, poses, start, stop, keys, views):
         directions[0], directions[1] = np.cos(azimuths + heading), np.sin(azimuths + heading)
         view = _View(x, y, z, heading, top, rows_per_rad, width, height, start * n, stop * n)
         keys[start * n : stop * n] = 0
-        _draw(triangles, directions, tangents, view, keys)
-        _average(keys, n, *paint, start, stop, views[i])
+        _draw(triangles, directions, tangents, view, keys, lookup)
+        if lookup is None:
+            average(keys, n, colours, weights, start, stop, views[i])
+        else:
+            colour_rays(lookup, colours, directions, tangents, view, keys)
+            average(keys, n, None, weights, start, stop, views[i])

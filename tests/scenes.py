@@ -1,10 +1,13 @@
 """Tiny worlds and views for tests."""
 
+import dataclasses
+
 import numpy as np
 import torch
 
 from tussock.world.geometry import Bounds
 from tussock.world.scene import Ground, World
+from tussock.world.textures import Texture, Texturing
 
 FIELD = Bounds(-3.0, -3.0, 3.0, 3.0)
 
@@ -27,6 +30,20 @@ def world_of(triangles: np.ndarray, rgb: np.ndarray, *, ground: bool = True, dou
         field=FIELD,
         double_sided=double_sided,
     )
+
+
+def random_texture(seed: int, **settings) -> Texture:
+    rng = np.random.default_rng(seed)
+    return Texture(rgba=rng.integers(0, 256, (*rng.integers(1, 9, 2), 4), dtype=np.uint8), **settings)
+
+
+def textured_world(textures, seed: int = 0, n: int = 60, *, colours: bool = False, ground: bool = True) -> World:
+    """Random triangles, of which some have no texture, with uv from -2 to 3."""
+    world, rng = random_world(seed, n, ground=ground), np.random.default_rng(seed + 100)
+    index = rng.integers(-1, len(textures), n).astype(np.int32)
+    corner = rng.integers(0, 256, (n, 3, 4), dtype=np.uint8) if colours else None
+    uv = rng.uniform(-2, 3, (n, 3, 2)).astype(np.float32)
+    return dataclasses.replace(world, texturing=Texturing(textures=tuple(textures), index=index, uv=uv, colours=corner))
 
 
 def random_poses(n: int, seed: int = 1) -> np.ndarray:

@@ -4,6 +4,7 @@ PyOpenGL binds a process to EGL or to OSMesa, so one of them runs here and the o
 (`test_backend_in_its_own_process`). Without the library a test is skipped; with TUSSOCK_REQUIRE_GL=1 it fails.
 """
 
+import itertools
 import json
 import os
 import subprocess
@@ -15,8 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import trimesh
-from PIL import Image
+from scenes import random_poses, random_texture, textured_world
 
 from tussock.render import Eye, Renderer, gl, open_renderer
 from tussock.render.cubemap import Cubemap, face_size_for
@@ -25,6 +25,7 @@ from tussock.world.errors import InputError, MissingDependencyError, SettingErro
 from tussock.world.files import read_world
 from tussock.world.geometry import Bounds, Pose, turn_of_columns
 from tussock.world.scene import Ground, World
+from tussock.world.textures import ALPHAS, FILTERS, WRAPS, Texture, Texturing
 
 BACKENDS = ("egl", "osmesa")
 SKY, SAND = (191, 191, 191), (229, 183, 90)
@@ -181,43 +182,26 @@ def test_back_faces(backend):
     assert seen == {True: (True, True, True), False: (True, False, True)}
 
 
-def test_the_factor_of_a_material_tints_its_texture(backend):
-    corners, uv = np.array([(1, 1, 0), (1, -1, 0), (1, -1, 1), (1, 1, 1)]), [(0, 0), (1, 0), (1, 1), (0, 1)]
-    image = Image.fromarray(np.full((8, 8, 3), 200, np.uint8))
-    material = trimesh.visual.material.PBRMaterial(baseColorTexture=image, baseColorFactor=[0, 255, 127, 255])
-    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
-    quad = trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], visual=visual, process=False)
-    world = make_world(quad.triangles, [(0, 200, 100)] * 2, textured=(quad,))
-    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
-        assert_agree(ours.render([HERE]), cpu.render([HERE]))
-
-
 def test_an_empty_world_is_all_sky(backend):
     with open_renderer(make_world(ground=None), backend=backend) as ours:
         np.testing.assert_array_equal(ours.render([HERE]), np.full((1, 150, 720, 4), (*SKY, 0)))
 
 
-@pytest.mark.parametrize("pbr", [True, False])
-def test_a_textured_quad(backend, pbr):
-    """It is three texels wide, which a wrong row alignment shears. The meshes replace the triangles; the ground stays."""
+def test_a_textured_quad(backend):
+    """It is three texels wide, which a wrong row alignment shears; beside it, a quad of one colour, and the ground."""
     texels = np.array(
         [[(255, 0, 0), (0, 255, 0), (0, 0, 255)], [(255, 255, 0), (0, 255, 255), (9, 90, 200)]], dtype=np.uint8
     )
-    image = Image.fromarray(
-        np.kron(texels, np.ones((16, 16, 1), np.uint8))
-    )  # so that the middles of the texels are flat
+    rgba = np.concatenate([texels, np.full((2, 3, 1), 255, np.uint8)], axis=-1)
     corners = np.array([(1, 0.6, 0), (1, -0.6, 0), (1, -0.6, 0.8), (1, 0.6, 0.8)])
-    uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    kind = trimesh.visual.material.PBRMaterial if pbr else trimesh.visual.material.SimpleMaterial
-    material = kind(**{"baseColorTexture" if pbr else "image": image})
-    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
-    quad = trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], visual=visual, process=False)
-    plain = trimesh.Trimesh(
-        corners * [-1, 1, 1], [(0, 1, 2), (0, 2, 3)], face_colors=[(7, 8, 9, 255)] * 2, process=False
-    )
-    world = make_world(np.concatenate([quad.triangles, plain.triangles]), [(1, 2, 3)] * 4, textured=(quad, plain))
-    with open_renderer(world, backend=backend) as ours:
+    quad = corners[[(0, 1, 2), (0, 2, 3)]]
+    uv = np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float32)[[(0, 1, 2), (0, 2, 3), (0, 0, 0), (0, 0, 0)]]
+    index = np.array([0, 0, -1, -1], np.int32)
+    texturing = Texturing(textures=(Texture(rgba=rgba, filter="nearest"),), index=index, uv=uv)
+    world = make_world([*quad, *quad * [-1, 1, 1]], [(1, 2, 3)] * 2 + [(7, 8, 9)] * 2, texturing=texturing)
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
         view = ours.render([Pose(0, 0, 0)])[0]
+        assert_agree(view[None], cpu.render([Pose(0, 0, 0)]), share=0.001)
 
     def at(y, z):
         """The pixel that shows the point (1, y, z)."""
@@ -226,10 +210,31 @@ def test_a_textured_quad(backend, pbr):
 
     for row, z in enumerate((0.6, 0.2)):
         for column, y in enumerate((0.4, 0.0, -0.4)):
-            assert np.abs(at(y, z).astype(int) - [*texels[row, column], 255]).max() <= 2
+            assert at(y, z).tolist() == [*texels[row, column], 255]
     assert view[100, 0].tolist() == [7, 8, 9, 255]
     assert view[-1, 360].tolist() == [*SAND, 255]
     assert not (view == (1, 2, 3, 255)).all(-1).any()
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+@pytest.mark.parametrize("alpha", ALPHAS)
+@pytest.mark.parametrize("colours", [False, True])
+def test_agrees_in_textured_worlds(backend, kind, alpha, colours):
+    pairs = itertools.product(WRAPS, WRAPS)
+    textures = [random_texture(i, wrap=pair, filter=kind, alpha=alpha, cutoff=0.15 * i) for i, pair in enumerate(pairs)]
+    world = textured_world(textures, n=200, colours=colours)
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
+        assert_agree(ours.render(random_poses(2)), cpu.render(random_poses(2)), share=0.02)
+
+
+def test_textures_that_are_too_large_are_refused(backend, monkeypatch):
+    from OpenGL import GL
+
+    asked = GL.glGetIntegerv
+    monkeypatch.setattr(GL, "glGetIntegerv", lambda name: 4 if name == GL.GL_MAX_TEXTURE_SIZE else asked(name))
+    world = textured_world([Texture(rgba=np.zeros((2, 5, 4), np.uint8))])
+    with pytest.raises(SettingError, match=r"5 x 2 pixels.*allows 4.*cpu"):
+        open_renderer(world, backend=backend)
 
 
 def test_several_renderers_at_once(backend, garden, sussex_world):

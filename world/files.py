@@ -7,7 +7,6 @@ PLY: a header comment), and reads back equal. GLB files have y up, as the standa
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from .atomic import replacing
 from .axes import turned_y_up
 from .errors import FileError, InputError, SettingError
 from .file_kinds import refuse_other_kinds
+from .mesh_export import material_writer, meshes_of
 from .mesh_files import read_mesh
 from .mesh_reading import MeshReading
 from .params import WORLDS, check_preset, is_generated
@@ -86,7 +86,7 @@ def write_world(world: World, path: str | os.PathLike) -> None:
     suffix = path.suffix.lower()
     if suffix not in (".glb", ".ply"):
         raise FileError(f"{path}: a world is written as .glb or .ply, not {suffix or 'a name without a suffix'!r}")
-    if suffix == ".ply" and world.textured:
+    if suffix == ".ply" and world.texturing is not None:
         raise FileError(f"{path}: a .ply cannot hold the textures of this world; write it as .glb")
     if len(world.triangles) == 0:
         raise FileError(f"{path}: this world holds no triangles; there is nothing to write")
@@ -99,26 +99,17 @@ def _as_glb(world: World) -> bytes:
     """The content of a GLB, with y up; the names of its meshes keep their order."""
     import trimesh
 
-    meshes = [mesh.copy() for mesh in world.textured] or [_as_mesh(world)]
-    for mesh in meshes:
+    meshes = meshes_of(world)
+    for mesh in meshes.values():
         mesh.vertices = turned_y_up(np.asarray(mesh.vertices))
-    scene = trimesh.Scene({f"{i:06d}": mesh for i, mesh in enumerate(meshes)})
+    scene = trimesh.Scene(meshes)
     scene.metadata[KEY] = to_json(world)
-    return bytes(scene.export(file_type="glb"))  # type: ignore[arg-type]
+    return bytes(scene.export(file_type="glb", tree_postprocessor=material_writer(world)))  # type: ignore[arg-type]
 
 
 def _as_ply(world: World) -> bytes:
     """The content of a PLY, with a comment in its header."""
-    data = bytes(_as_mesh(world).export(file_type="ply"))  # type: ignore[arg-type]
+    (mesh,) = meshes_of(world).values()
+    data = bytes(mesh.export(file_type="ply"))  # type: ignore[arg-type]
     head, first_element, rest = data.partition(b"element vertex")
     return head + f"comment {KEY} {json.dumps(to_json(world))}\n".encode("ascii") + first_element + rest
-
-
-def _as_mesh(world: World) -> Any:
-    """A trimesh mesh of the triangles, which share no corners; each corner has the colour of its triangle."""
-    import trimesh
-
-    n = len(world.triangles)
-    rgba = np.column_stack([world.rgb, np.full(n, 255, np.uint8)])
-    corners, faces = world.triangles.reshape(-1, 3), np.arange(3 * n).reshape(n, 3)
-    return trimesh.Trimesh(corners, faces, vertex_colors=np.repeat(rgba, 3, axis=0), process=False)

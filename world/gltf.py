@@ -15,6 +15,7 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 
 from .errors import FileError
+from .gltf_materials import carry_materials
 from .gltf_numbers import Accessors
 from .mesh_search import Neighbours
 
@@ -55,6 +56,7 @@ def prepared_gltf(path: Path, search: Neighbours) -> tuple[bytes, list[str]]:
     _expand_instances(tree, accessors)
     _write_out_numbers(tree, accessors)
     _check_textures(tree, accessors.buffer, search)
+    carry_materials(tree)
     return _as_glb(tree, accessors.buffer), remarks
 
 

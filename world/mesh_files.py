@@ -14,7 +14,7 @@ from .errors import FileError, InputError, first_line
 from .file_kinds import MAKE_A_MESH, head_of
 from .geometry import Bounds
 from .gltf import prepared_gltf
-from .mesh_materials import face_rgb, texture_of
+from .mesh_materials import appearance_of
 from .mesh_reading import MeshReading
 from .mesh_remarks import remarks_on_axes_and_units
 from .mesh_search import Neighbours
@@ -168,8 +168,7 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
     for mesh in meshes:
         mesh.vertices = turned_z_up(np.asarray(mesh.vertices, np.float64), up) * reading.metres - np.array(origin)
     triangles = np.concatenate([mesh.triangles for mesh in meshes]).astype(np.float32)
-    rgb = np.concatenate([face_rgb(mesh) for mesh in meshes])
-    textured = tuple(meshes) if any(texture_of(mesh) is not None for mesh in meshes) else ()
+    rgb, texturing = appearance_of(meshes, path, file.search.get)
     own = _own_data(path, file.own, triangles) if file.own is not None else None
     if own is None:
         corners_xy = triangles.reshape(-1, 3)[:, :2].astype(float)
@@ -179,7 +178,7 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
             "field": Bounds(*corners_xy.min(axis=0).tolist(), *corners_xy.max(axis=0).tolist()),
             "origin_m": origin,
         }
-    return World(triangles=triangles, rgb=rgb, textured=textured, **own)
+    return World(triangles=triangles, rgb=rgb, texturing=texturing, **own)
 
 
 def _say_far(path: Path, origin: tuple[float, float, float], step: float) -> None:

@@ -11,8 +11,8 @@ from .polygons import triangulated
 
 LIBRARY = "tussock.mtl"  # name of all material files together, in what trimesh is given
 MAP_OPTIONS = {  # of a texture in an MTL file, and how many values follow
-    "-blendu": 1, "-blendv": 1, "-boost": 1, "-bm": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3,
-    "-texres": 1, "-type": 1,
+    "-blendu": 1, "-blendv": 1, "-boost": 1, "-bm": 1, "-cc": 1, "-clamp": 1, "-colorspace": 1, "-imfchan": 1, "-mm": 2, "-o": 3, "-s": 3,
+    "-t": 3, "-texres": 1, "-type": 1,
 }  # fmt: skip
 OPTIONAL_VALUES = ("-o", "-s", "-t")  # of their three values, the last two may be left out
 USED_MAPS = ("map_kd", "map_d")

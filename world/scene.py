@@ -12,6 +12,7 @@ from .generate import GENERATOR, generate_plants
 from .geometry import Bounds
 from .params import WORLDS, WorldParams, preset_of
 from .settings import MAX_COORDINATE, RGB
+from .textures import Texturing
 
 
 def check_colour(label: str, value: Any) -> None:
@@ -57,8 +58,9 @@ class World:
         field: Where an agent may be (m).
         double_sided: False culls back faces: a triangle is visible only from the side that (v1 - v0) x (v2 - v0) points to.
         origin: How the world was made (preset, seed, parameters); it is saved and loaded with the world.
-        textured: The meshes of the file, where they have textures; the GL renderers draw these.
         origin_m: What was subtracted from the coordinates of the file (m): they are those of the world plus this.
+        texturing: Textures and corner colours of the triangles, or None. `rgb` is then the mean colour of each triangle, which
+            maps and recordings show; the renderers draw the texturing.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -68,8 +70,8 @@ class World:
     field: Bounds
     double_sided: bool = True
     origin: dict[str, Any] = dataclasses.field(default_factory=dict)
-    textured: tuple[Any, ...] = ()
     origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    texturing: Texturing | None = None
 
     def __post_init__(self):
         n = len(self.triangles)
@@ -86,6 +88,8 @@ class World:
             raise SettingError(
                 f"triangle {invalid} of the world has a corner that is not finite, or over {MAX_COORDINATE:g} m away; repair the mesh"
             )
+        if self.texturing is not None and len(self.texturing.index) != n:
+            raise SettingError(f"the texturing of a world is of its {n} triangles, got {len(self.texturing.index)}")
         check_colour("the colour of the sky", self.sky_rgb)
         check_bounds("the field", self.field)
         if not (len(self.origin_m) == 3 and np.isfinite(self.origin_m).all()):

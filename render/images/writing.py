@@ -161,6 +161,7 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
     eye, world = renderer.eye, renderer.world
     triangles, rgb = world.surfaces()
     scene = triangles.tobytes() + rgb.tobytes() + bytes([*world.sky_rgb, world.double_sided])
+    scene += world.texturing.to_bytes() if world.texturing else b""
     tussock = {
         "version": 1,
         "world": hashlib.sha256(scene).hexdigest(),
