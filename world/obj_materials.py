@@ -9,6 +9,9 @@ import numpy as np
 from .materials import Material, white_image
 
 
+_NOT_DRAWN = {"-mm": (0.0, 1.0), "-t": (0.0, 0.0, 0.0)}  # options, with the numbers that change nothing
+
+
 def obj_material(simple: Any, get: Callable[[str], bytes] | None) -> Material:
     """The material of a mesh from a `SimpleMaterial` of trimesh.
 
@@ -21,7 +24,10 @@ def obj_material(simple: Any, get: Callable[[str], bytes] | None) -> Material:
         image = None
     options = {key.removeprefix("map_kd"): values for key, values in keys.items() if key.startswith("map_kd-")}
     red, green, blue = _colour(simple, image)
-    alpha_image, lost = None, [f"option {name} of a texture" for name in ("-mm", "-t") if name in options]
+    alpha_image = None
+    lost = [
+        f"option {name} of a texture" for name, unchanged in _NOT_DRAWN.items() if _changes(options, name, unchanged)
+    ]
     if "map_d" in keys:
         alpha_image = _image(" ".join(keys["map_d"]), get)
         if image is None and alpha_image is not None:
@@ -39,6 +45,12 @@ def obj_material(simple: Any, get: Callable[[str], bytes] | None) -> Material:
         transform=_transform(options),
         lost=tuple(lost),
     )
+
+
+def _changes(options: dict[str, list[str]], name: str, unchanged: tuple[float, ...]) -> bool:
+    """Whether an option is there with other numbers than those that change nothing."""
+    words = options.get(name, [])
+    return tuple(map(float, words)) != unchanged[: len(words)]
 
 
 def _colour(simple: Any, image: Any) -> np.ndarray:
