@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float, Float32, UInt8
 
 from .errors import SettingError
 from .generate import GENERATOR, generate_plants
 from .geometry import Bounds
 from .params import WORLDS, WorldParams, preset_of
 from .settings import MAX_COORDINATE, RGB
+from .terrain import MAX_SLOPE, Terrain
 
 
 def check_colour(label: str, value: Any) -> None:
@@ -50,7 +51,7 @@ class World:
     """Everything that can be seen. Immutable.
 
     Attributes:
-        triangles: (n, 3, 3) corners: triangle, corner, xyz (m, z up, ground at z = 0).
+        triangles: (n, 3, 3) corners: triangle, corner, xyz (m, z up).
         rgb: (n, 3) one colour per triangle.
         ground: The ground, or None.
         sky_rgb: Colour of the sky.
@@ -58,6 +59,7 @@ class World:
         double_sided: False culls back faces: a triangle is visible only from the side that (v1 - v0) x (v2 - v0) points to.
         origin: How the world was made (preset, seed, parameters); it is saved and loaded with the world.
         textured: The meshes of the file, where they have textures; the GL renderers draw these.
+        terrain: The ground of the mesh, which agents stand on (see `on_mesh`); None: they stand at z = 0.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -68,6 +70,7 @@ class World:
     double_sided: bool = True
     origin: dict[str, Any] = dataclasses.field(default_factory=dict)
     textured: tuple[Any, ...] = ()
+    terrain: Terrain | None = None
 
     def __post_init__(self):
         n = len(self.triangles)
@@ -115,6 +118,22 @@ class World:
             field=made.field,
             origin={"generator": GENERATOR, "preset": preset_of(made), "seed": int(seed), "params": made.to_dict()},
         )
+
+    def on_mesh(self, max_slope: float = MAX_SLOPE) -> "World":
+        """The same world, where agents stand on its triangles (and `ground`); terrain.py explains on which of them.
+
+        Args:
+            max_slope: Steepest ground that can be stood and walked on (rad).
+
+        Raises:
+            InputError: Where nothing can be stood on.
+        """
+        terrain = Terrain.of(self.surfaces()[0], float(np.prod(self.field.size)), max_slope)
+        return dataclasses.replace(self, terrain=terrain)
+
+    def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+        """Height of the ground at positions (both m): 0, or that of the terrain, where there is one; nan where it has no ground."""
+        return np.zeros(len(xy)) if self.terrain is None else self.terrain.height(xy)
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
         """Triangles and colours, with the two triangles of the ground (facing up) at the end: what a renderer draws."""
