@@ -19,6 +19,8 @@ VERSION = 4  # of what a run does: a change that alters results raises it, and r
 ROUTE_SETTINGS = (
     "world",
     "world_seed",
+    "ground",
+    "max_slope_deg",
     "cull_back_faces",
     "route",
     "route_seed",

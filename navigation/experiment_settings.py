@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 # `experiment_of` and `settings_of`; and a flag of `RunOptions` in cli/options.py. It is part of the key of a run from then on, so
 # no runs are added to earlier folders of sweeps.
 TYPES: dict[str, Any] = {
-    "world": str, "world_seed": int | None, "seed": int, "size": str | None, "renderer": str, "samples": int | None,
+    "world": str, "world_seed": int | None, "ground": str, "max_slope_deg": float,
+    "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
     "route_seed": int | None, "route_length_m": float, "encoding": str | None, "resize": float | None, "blur": float,
     "spacing_m": float, "every": int, "learning_walk_m": float, "device": str, "model": str, "threads": int | None, "step_m": float,
@@ -85,6 +86,8 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     return {
         "world": _source(experiment.world, "world"),
         "world_seed": experiment.world_seed,
+        "ground": experiment.ground,
+        "max_slope_deg": degrees(experiment.max_slope),
         "seed": experiment.seed,
         "size": f"{eye.width}x{eye.height}",
         "renderer": experiment.renderer,
@@ -174,9 +177,11 @@ def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]:
     """The fields of `Surroundings`. known: the eye that a model was trained with."""
-    names = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
+    names = ("world", "world_seed", "ground", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
     fields = {name: given[name] for name in names if name in given}
-    return fields | _values(given, route_length="route_length_m") | {"eye": _eye(given, known)}
+    return (
+        fields | _values(given, route_length="route_length_m", max_slope="max_slope_deg") | {"eye": _eye(given, known)}
+    )
 
 
 def _eye(given: Mapping[str, Any], known: Eye | None) -> Eye:

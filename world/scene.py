@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32, UInt8
+from jaxtyping import Bool, Float, Float32, UInt8
 
 from .errors import SettingError
 from .generate import GENERATOR, generate_plants
@@ -134,6 +134,10 @@ class World:
     def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Height of the ground at positions (both m): 0, or that of the terrain, where there is one; nan where it has no ground."""
         return np.zeros(len(xy)) if self.terrain is None else self.terrain.height(xy)
+
+    def stands(self, xy: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Whether there is ground at positions (m)."""
+        return ~np.isnan(self.ground_height(xy))
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
         """Triangles and colours, with the two triangles of the ground (facing up) at the end: what a renderer draws."""

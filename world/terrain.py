@@ -88,6 +88,13 @@ class Terrain:
                 np.maximum.at(highest[part], point, np.where(np.isnan(height), -np.inf, height))
         return np.where(np.isneginf(highest), np.nan, highest)
 
+    def is_too_steep(self, distance, rise):
+        """Whether the ground is too steep between points some distance apart (m, over the x-y plane) that rises so much (m).
+
+        Works on arrays. A rise up to STEP_HEIGHT never is.
+        """
+        return np.abs(rise) > np.maximum(np.tan(self.max_slope) * distance, STEP_HEIGHT)
+
     def is_steep(self, x: float, y: float) -> bool:
         """Whether the mesh is too steep to be ground at a position (m). Takes long: it looks at every triangle."""
         here = (self.triangles[..., :2].min(axis=1) <= (x, y)).all(axis=1) & ~self.is_ground
