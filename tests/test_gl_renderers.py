@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from scenes import hills, mesh_world, post
 
 from tussock.render import Eye, Renderer, gl, open_renderer
 from tussock.render.cubemap import Cubemap, face_size_for
@@ -190,6 +191,14 @@ def test_the_factor_of_a_material_tints_its_texture(backend):
     world = make_world(quad.triangles, [(0, 200, 100)] * 2, textured=(quad,))
     with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
         assert_agree(ours.render([HERE]), cpu.render([HERE]))
+
+
+def test_an_eye_stands_on_the_mesh(backend):
+    posts = [post(x, y, 41.6, 1.0) for x, y in np.random.default_rng(1).uniform(0.5, 5.5, (20, 2))]
+    world = mesh_world(hills() + (0, 0, 42), *posts).on_mesh()
+    poses = [Pose(2.0, 2.2, 1.0), Pose(5.0, 4.1, -2.0)]
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
+        assert_agree(ours.render(poses), cpu.render(poses))
 
 
 def test_an_empty_world_is_all_sky(backend):
