@@ -57,7 +57,7 @@ VALUES: dict[str, st.SearchStrategy] = {
     "top_deg": decimals(0.001, 90),
     "bottom_deg": decimals(-90, 0),
     "ground": st.sampled_from(["flat", "mesh"]),
-    "max_slope_deg": st.floats(1.0, 89.0),
+    "max_slope_deg": decimals(1, 89),
     "cull_back_faces": st.booleans(),
     "route": st.just("route.csv"),
     "route_seed": SEEDS,

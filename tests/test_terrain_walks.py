@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 import json
 
 import cv2
@@ -257,7 +258,7 @@ def test_run_stands_on_the_mesh_in_all_that_it_writes(files, tmp_path, capfd, mo
         Recording, "_send", lambda self, entity, steps, columns: logged.setdefault(entity, []).extend(columns)
     )
     world, out = str(files / "hills_42.obj"), tmp_path / "run"
-    command = ["run", "--world", world, "--ground", "mesh", "--size", "120x25", "--route-length-m", "4", "--json"]
+    command = ["run", "--world", world, "--ground", "mesh", "--size", "120x25", "--route-length-m", "2", "--json"]
     code, printed, _ = tussock(capfd, *command, "--out", out)
     assert (code, json.loads(printed)["arrived"]) == (0, True)
     rows = pd.read_csv(out / "trajectory.csv")
@@ -271,7 +272,7 @@ def test_run_stands_on_the_mesh_in_all_that_it_writes(files, tmp_path, capfd, mo
     arrows = [each.component_batch for each in logged["world/agent"]]
     names = [each.component_descriptor().component for each in arrows]
     placed = [each.as_arrow_array().to_pylist() for each, name in zip(arrows, names, strict=True) if "origins" in name]
-    origins = np.array(sum(placed, [])).reshape(-1, 3)
+    origins = np.array(list(itertools.chain(*placed))).reshape(-1, 3)
     np.testing.assert_allclose(origins[:, 2], rows["z_m"] + 0.015, atol=1e-4)
 
 
