@@ -8,7 +8,7 @@ class Body:
     """How an agent moves.
 
     Attributes:
-        step_length: Length of a whole step (m).
+        step_length: Length of a whole step (m), measured over the x-y plane, also where the ground slopes.
         heading_noise: Standard deviation of the normal noise on every turn (rad).
     """
 

@@ -58,7 +58,7 @@ def compare_models(
         route: Through it.
         positions: (n, 2) Where headings are recovered (m).
     """
-    check_inside(experiment.start(route), renderer.world.field)
+    check_inside(experiment.start(route), renderer.world)
     encoding = experiment.encoding
     on_route = experiment.replace(training__learning_walk=0.0)
     views_on_route, views_around = (

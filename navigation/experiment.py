@@ -202,9 +202,10 @@ class Experiment(Surroundings):
         from .training import training_poses
 
         setup = self.training
-        return training_poses(
+        poses = training_poses(
             route, setup.spacing, every=setup.every, learning_walk=setup.learning_walk, field=world.field
         )
+        return poses[world.stands(poses[:, :2])]
 
     def check_matches(self, trained: "TrainedModel") -> None:
         """Refuse a trained model that learned through another eye or encoding. Raises SettingError."""
@@ -245,7 +246,7 @@ class Experiment(Surroundings):
         with ExitStack() as stack:
             world = self.open_world()
             route = self.open_route(world)
-            check_inside(self.start(route), world.field)  # before the work begins
+            check_inside(self.start(route), world)  # before the work begins
             renderer = stack.enter_context(self.open_renderer(world))
             log.info(f"renderer: {renderer.backend}")
             yield self.train(renderer, route, progress)

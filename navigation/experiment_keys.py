@@ -23,6 +23,8 @@ ROUTE_SETTINGS = (
     "unit",
     "scale",
     "strict",
+    "ground",
+    "max_slope_deg",
     "cull_back_faces",
     "route",
     "route_seed",

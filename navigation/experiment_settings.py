@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 # no runs are added to earlier folders of sweeps.
 TYPES: dict[str, Any] = {
     "world": str, "world_seed": int | None, "up": str, "unit": str, "scale": float | None, "strict": bool,
+    "ground": str, "max_slope_deg": float,
     "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
     "route_seed": int | None, "route_length_m": float, "encoding": str | None, "resize": float | None, "blur": float,
@@ -92,6 +93,8 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "unit": reading.unit,
         "scale": reading.scale,
         "strict": reading.strict,
+        "ground": experiment.ground,
+        "max_slope_deg": degrees(experiment.max_slope),
         "seed": experiment.seed,
         "size": f"{eye.width}x{eye.height}",
         "renderer": experiment.renderer,
@@ -181,10 +184,11 @@ def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]:
     """The fields of `Surroundings`. known: the eye that a model was trained with."""
-    names = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
+    names = ("world", "world_seed", "ground", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
     fields = {name: given[name] for name in names if name in given}
     fields["reading"] = MeshReading(**_values(given, up="up", unit="unit", scale="scale", strict="strict"))
-    return fields | _values(given, route_length="route_length_m") | {"eye": _eye(given, known)}
+    values = _values(given, route_length="route_length_m", max_slope="max_slope_deg")
+    return fields | values | {"eye": _eye(given, known)}
 
 
 def _eye(given: Mapping[str, Any], known: Eye | None) -> Eye:

@@ -13,6 +13,8 @@ class StopReason(StrEnum):
     LOST = "lost"
     STUCK = "stuck in a loop"
     OUT_OF_WORLD = "out of the world"
+    OFF_GROUND = "off the ground"
+    TOO_STEEP = "too steep"
     OUT_OF_STEPS = "out of steps"
 
 
@@ -26,8 +28,8 @@ class StoppingRules:
         max_deviation: The agent is lost farther than this from the route (m).
         patience: The agent is stuck after this distance without getting farther along the route (m).
         max_steps: Limit of steps; None means as many as three times the route's length needs.
-        put_back: Instead of ending the walk, put an agent that is lost, stuck or out of the world back on the route, at the waypoint
-            after the furthest one that it reached, facing along the route. Ardin et al. (2016) count errors so.
+        put_back: Instead of ending the walk, put an agent that is lost, stuck, out of the world or stopped by the ground back on the
+            route, at the waypoint after the furthest one that it reached, facing along the route. Ardin et al. (2016) count errors so.
         waypoint_spacing: Distance between waypoints along the route (m).
     """
 

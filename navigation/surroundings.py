@@ -1,6 +1,7 @@
 """Where an experiment takes place: a world, a route through it, and the eye that sees it. Light to import."""
 
 import dataclasses
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 S = TypeVar("S", bound="Surroundings")
 
 BACKENDS = ("auto", "cpu", "egl", "osmesa")
+GROUNDS = ("flat", "mesh")
 
 
 def _world(value: Any) -> Any:
@@ -55,6 +57,8 @@ class Surroundings:
         world: A preset's name (parameters may follow it), a file, or a `World`.
         world_seed: Of a generated world; None means `seed`.
         reading: How the file of a world is read: its axis that is up, its unit, and whether losses are refused.
+        ground: "flat": agents stand at z = 0. "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`).
+        max_slope: Steepest ground of a mesh that can be stood and walked on (rad).
         cull_back_faces: Triangles are seen from their front only, as the original Sussex renderer did.
         route: A `Route`, its file, or None to generate one. It may be in the coordinates of the world's file; see `World.origin_m`.
         route_seed: Of a generated route; None means `seed`.
@@ -68,6 +72,8 @@ class Surroundings:
     world: Any = attrs.field(default="tussock-field", converter=_world)
     world_seed: int | None = whole(None, low=0, optional=True)
     reading: MeshReading = instance_of(MeshReading, attrs.Factory(MeshReading), "a MeshReading")
+    ground: str = choice("flat", GROUNDS)
+    max_slope: float = number(math.radians(45.0), low=math.radians(1.0), high=math.radians(89.0), unit="rad")
     cull_back_faces: bool = switch(False)
     route: Any = attrs.field(default=None, converter=_route)
     route_seed: int | None = whole(None, low=0, optional=True)
@@ -98,13 +104,20 @@ class Surroundings:
     def open_world(self) -> "World":
         """The world. Raises InputError where its file cannot be read, or where an axis or a unit is given without a file."""
         from tussock.world.files import open_world
+        from tussock.world.ground_check import remark_on_ground
+        from tussock.world.params import is_generated
         from tussock.world.scene import World
 
         if isinstance(self.world, World) and self.reading.changes_coordinates:
             raise SettingError("up, unit and scale are for files of meshes; this world is in memory: leave them out")
         seed = self.seed if self.world_seed is None else self.world_seed
         world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
-        return dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
+        world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
+        if self.ground == "mesh":
+            return world.on_mesh(self.max_slope)
+        if isinstance(self.world, str) and not is_generated(self.world):
+            remark_on_ground(world, self.world, self.eye.z)
+        return world
 
     def open_route(self, world: "World") -> "Route":
         """The route through the world. Raises InputError where it leaves the world, or where none is found."""

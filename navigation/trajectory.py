@@ -18,7 +18,7 @@ from .stopping import StopReason
 from .walk import Step
 
 COLUMNS = (
-    "step", "x_m", "y_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
+    "step", "x_m", "y_m", "z_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
     "match", "place", "reset", "reason", "covered", "nearest_view_m", "recognised_view_m", "turning_deg", "cause",
 )  # fmt: skip
 
@@ -37,7 +37,7 @@ class Trajectory:
         """Append a step, and what `Diagnostics` measured there."""
         scanned = None if step.familiarity is None else float(step.familiarity[step.scanned].max())
         heading, turn, error = (float(np.degrees(angle)) for angle in (step.pose.heading, step.turn, step.error))
-        row = (step.index, *step.pose[:2], heading, turn, scanned, step.deviation, step.along, error)
+        row = (step.index, *step.pose[:2], step.height, heading, turn, scanned, step.deviation, step.along, error)
         row += (step.match, step.progress, step.reset, step.reason, *_measured(diagnosis))
         self.rows.append(tuple(map(_plain, row)))
 

@@ -16,10 +16,12 @@ from jaxtyping import Bool, Float32, UInt8
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Pose, Route, place_text, wrap_angle
+from tussock.world.scene import World
+from tussock.world.terrain import Terrain
 
 from .body import Body
 from .encoding import Encoding
-from .steering.navigator import Look, Motion, Navigator
+from .steering.navigator import Look, Motion, Navigator, check_motion
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread
 
@@ -27,6 +29,8 @@ RECOVERABLE = (
     StopReason.LOST,
     StopReason.STUCK,
     StopReason.OUT_OF_WORLD,
+    StopReason.OFF_GROUND,
+    StopReason.TOO_STEEP,
 )  # from where an agent can be put back on the route
 
 
@@ -37,6 +41,7 @@ class Step:
     Attributes:
         index: 0 for the first look.
         pose: Where the agent stands and faces as it looks.
+        height: Of the ground beneath it (m).
         view: (height, width, 4) What it sees, RGBA; None where it was not drawn.
         familiarity: (w,) Of every rotation, turned left by 0, 1, .. columns; None where the navigator does not scan.
         scanned: (w,) Which of these rotations the navigator compared; None likewise.
@@ -54,6 +59,7 @@ class Step:
 
     index: int
     pose: Pose
+    height: float
     view: UInt8[np.ndarray, "height width 4"] | None
     familiarity: Float32[np.ndarray, " w"] | None
     scanned: Bool[np.ndarray, " w"] | None
@@ -99,11 +105,11 @@ class Walk:
             noise: What the noise on the turns is drawn from: a generator for each agent, or a seed (agent k takes seed + k).
 
         Raises:
-            SettingError: For a start outside of the world.
+            SettingError: For a start outside of the world, or off its ground.
         """
         self.renderer, self.encoding, self.route = renderer, encoding, route
         self.body, self.stopping = body or Body(), stopping or StoppingRules()
-        self.field = renderer.world.field
+        self.world = renderer.world
         self.step_limit = self.stopping.step_limit(route.length, self.body.step_length)
         generators = (
             [np.random.default_rng(noise + k) for k in range(len(starts))]
@@ -148,6 +154,9 @@ class Walk:
     def _measure(self, agents: Sequence["Walker"]) -> None:
         """Find where agents have come to, and whether their walks end there."""
         if agents:
+            heights = self.world.ground_height(np.array([agent.pose[:2] for agent in agents]))
+            for agent, height in zip(agents, heights.tolist(), strict=True):
+                agent.tread(height)
             deviation, along = self.route.nearest(np.array([agent.pose[:2] for agent in agents]))
             headings = self.route.at(along)[:, 2]
             for agent, *measured in zip(agents, deviation.tolist(), along.tolist(), headings.tolist(), strict=True):
@@ -158,17 +167,41 @@ class Walker:
     """Where one agent of a walk is, and what it has done so far."""
 
     def __init__(self, walk: Walk, number: int, start: Pose, random: np.random.Generator):
-        check_inside(start, walk.field)
+        check_inside(start, walk.world)
         self.walk, self.number, self.random = walk, number, random
         self.pose = Pose(start.x, start.y, float(wrap_angle(start.heading)))
-        self.stop_check = StopCheck(walk.stopping, walk.route, walk.field, walk.body.step_length)
+        self.stop_check = StopCheck(walk.stopping, walk.route, walk.world.field, walk.body.step_length)
         self.index, self.ended = 0, False
         self.reset: StopReason | None = None
+        self.trodden: tuple[Pose, float] | None = (
+            None  # where it stood before its step, and how high; None after being put back
+        )
+        self.stopped: StopReason | None = None  # by the ground
+
+    def tread(self, height: float) -> None:
+        """Take in the height of the ground at its pose (m). It does not make a step that the ground does not allow."""
+        terrain = self.walk.world.terrain
+        self.stopped = None
+        if terrain is not None and self.trodden is not None:
+            before, height_before = self.trodden
+            self.stopped = self._obstacle(terrain, before, height - height_before)
+            if self.stopped is not None:
+                self.pose, height = Pose(before.x, before.y, self.pose.heading), height_before
+        self.height = height
+
+    def _obstacle(self, terrain: Terrain, before: Pose, rise: float) -> StopReason | None:
+        """Why the step from a pose to the present one, which rises by some metres, cannot be made; None where it can."""
+        x, y, _ = self.pose
+        if not self.walk.world.field.contains(x, y):
+            return StopReason.OUT_OF_WORLD
+        if np.isnan(rise):
+            return StopReason.TOO_STEEP if terrain.is_steep(x, y) else StopReason.OFF_GROUND
+        return StopReason.TOO_STEEP if terrain.is_too_steep(np.hypot(x - before.x, y - before.y), rise) else None
 
     def measure(self, deviation: float, along: float, route_heading: float) -> None:
         """Take in how far it is from the route (m) and along it (m), and the route's heading there (rad)."""
         self.deviation, self.along, self.route_heading = deviation, along, route_heading
-        self.reason = self.stop_check.check(self.pose, deviation, along)
+        self.reason = self.stop_check.check(self.pose, deviation, along) or self.stopped
         if self.reason is None and self.index >= self.walk.step_limit:
             self.reason = StopReason.OUT_OF_STEPS
 
@@ -182,6 +215,7 @@ class Walker:
         step = Step(
             index=self.index,
             pose=pose,
+            height=self.height,
             view=view,
             familiarity=None if scan is None else scan.familiarity[row],
             scanned=None if scan is None else scan.window[row],
@@ -198,6 +232,7 @@ class Walker:
         )
         self.reset = self.reason if put_back else None
         self.ended = step.reason is not None
+        self.trodden = None if put_back else (pose, self.height)
         if put_back:
             self.pose = self.stop_check.put_back()
         elif not self.ended:
@@ -249,25 +284,13 @@ class StopCheck:
         return bool(np.hypot(pose.x - goal.x, pose.y - goal.y) <= self.stopping.arrival_radius)
 
 
-def check_motion(motion: Motion, n: int, navigator: Navigator) -> None:
-    """Refuse a motion that n agents cannot make. Raises SettingError."""
-    step = np.ones(n) if motion.step is None else np.asarray(motion.step)
-    valid = (
-        np.shape(motion.turn) == step.shape == (n,)
-        and np.isfinite(motion.turn).all()
-        and (step >= 0).all()
-        and (step <= 1).all()
-    )
-    if not valid:
+def check_inside(pose: Pose, world: World) -> None:
+    """Refuse a start that is outside of the world, or off its ground. Raises SettingError."""
+    if not np.isfinite(pose).all() or not world.field.contains(pose.x, pose.y):
         raise SettingError(
-            f"{type(navigator).__name__} decided to turn by {motion.turn} and to step by {motion.step}; it must return {n} finite turns "
-            "(rad) and, if any, as many shares of a step, from 0 to 1"
+            f"the start {place_text(pose.x, pose.y)} is outside the world ({world.field}); choose another route or offset"
         )
-
-
-def check_inside(pose: Pose, field: Bounds) -> None:
-    """Refuse a start that is outside of the world. Raises SettingError."""
-    if not np.isfinite(pose).all() or not field.contains(pose.x, pose.y):
+    if world.terrain is not None and not world.stands(np.array([pose[:2]]))[0]:
         raise SettingError(
-            f"the start {place_text(pose.x, pose.y)} is outside the world ({field}); choose another route or offset"
+            f"a walk cannot start there: {world.terrain.problem(pose.x, pose.y)}; choose another route or offset"
         )

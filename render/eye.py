@@ -22,7 +22,7 @@ class Eye:
         height: Rows, from `top` to `bottom`.
         top: Elevation of the upper edge (rad).
         bottom: Elevation of the lower edge (rad).
-        z: Height of the eye above z = 0 (m).
+        z: Height of the eye above the ground (m).
         samples: n, where n x n rays in each pixel are averaged by solid angle. None means 1 where a pixel is at most one degree
             wide, else 4.
     """

@@ -6,6 +6,7 @@ from tussock.world.geometry import Pose, column_azimuths
 from tussock.world.scene import World
 
 from .eye import Eye
+from .poses import poses_of_eye
 
 RAY_SPACING = np.radians(5.0)  # rad
 
@@ -31,9 +32,13 @@ def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float
     azimuths = column_azimuths(round(2 * np.pi / RAY_SPACING))
     up = np.broadcast_to(np.sin(elevations), (rows, len(azimuths)))
     rays = np.stack([np.cos(elevations) * np.cos(azimuths), np.cos(elevations) * np.sin(azimuths), up]).reshape(3, -1).T
-    position = np.array([pose.x, pose.y, eye.z])
+    x, y, _, z = poses_of_eye(world, eye, [pose])[0]
+    position = np.array([x, y, z])
     close = (world.triangles.min(axis=1) < position + distance) & (world.triangles.max(axis=1) > position - distance)
-    a, b, c = (world.triangles[close.all(axis=1)].astype(float) - position).transpose(1, 0, 2)
+    close = close.all(axis=1)
+    if world.terrain is not None:
+        close &= ~world.terrain.is_ground[: len(close)]  # the world's own ground is after its triangles
+    a, b, c = (world.triangles[close].astype(float) - position).transpose(1, 0, 2)
     volume = (a * np.cross(b, c)).sum(axis=1)
     visible = volume != 0 if world.double_sided else volume < 0
     a, b, c, volume = a[visible], b[visible], c[visible], volume[visible]

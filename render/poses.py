@@ -7,7 +7,10 @@ from jaxtyping import Float, UInt8
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Pose
+from tussock.world.scene import World
 from tussock.world.settings import MAX_COORDINATE
+
+from .eye import Eye
 
 Poses = Float[np.ndarray, "n 3"] | Sequence[Pose | Sequence[float] | Float[np.ndarray, "3"]]
 Views = UInt8[np.ndarray, "n height width 4"]
@@ -35,3 +38,19 @@ def as_poses(poses: Poses) -> Float[np.ndarray, "n 3"]:
         row = int(valid.argmin())
         raise SettingError(f"pose {row} is {array[row].tolist()}; give finite numbers up to {MAX_COORDINATE:g}")
     return array
+
+
+def poses_of_eye(world: World, eye: Eye, poses: Poses) -> Float[np.ndarray, "n 4"]:
+    """Where an eye is that stands on the ground at some poses: x (m), y (m), heading (rad) and height (m).
+
+    Raises:
+        SettingError: A pose is not valid (see `as_poses`), or there is no ground beneath it.
+    """
+    poses = as_poses(poses)
+    ground = world.ground_height(poses[:, :2])
+    if world.terrain is not None and np.isnan(ground).any():
+        row = int(np.isnan(ground).argmax())
+        raise SettingError(
+            f"nothing can stand at pose {row}: {world.terrain.problem(*poses[row, :2].tolist())}; choose another"
+        )
+    return np.column_stack([poses, ground + eye.z])

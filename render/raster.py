@@ -22,7 +22,7 @@ from tussock.world.textures import Texturing
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
 from .gl import Context, Framebuffer, open_context
-from .poses import Poses, Views, as_poses
+from .poses import Poses, Views, poses_of_eye
 
 NEAR = 1e-4  # m; surfaces closer to the eye are not drawn. There is no far limit.
 
@@ -68,7 +68,7 @@ class RasterRenderer:
         """See `Renderer.render`. Threads may share a renderer; they take turns."""
         if not self._free.alive:
             raise InputError("this renderer is closed; open another one")
-        poses = as_poses(poses)
+        poses = poses_of_eye(self.world, self.eye, poses)
         views = np.empty((len(poses), self.eye.height, self.eye.width, 4), dtype=np.uint8)
         with self._context:
             for pose, view in zip(poses, views, strict=True):
@@ -78,13 +78,13 @@ class RasterRenderer:
                 view[:] = self._cubemap.unwrap(self._atlas)
         return views
 
-    def _draw(self, face: Face, pose: Float[np.ndarray, " 3"]) -> None:
+    def _draw(self, face: Face, pose: Float[np.ndarray, " 4"]) -> None:
         """Draw one face of the cube around the eye at a pose into its rows of the atlas."""
-        x, y, heading = pose
+        x, y, heading, z = pose
         c, s = np.cos(heading), np.sin(heading)
         right, up, forward = face.axes @ np.array([(c, s, 0), (-s, c, 0), (0, 0, 1)])
         camera = np.eye(4)
-        camera[:3] = np.column_stack([right, up, -forward, (x, y, self.eye.z)])
+        camera[:3] = np.column_stack([right, up, -forward, (x, y, z)])
         self._scene.set_pose(self._camera, camera)
         framebuffer, size = self._framebuffer, self._cubemap.size
 

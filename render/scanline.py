@@ -36,7 +36,7 @@ from tussock.world.textures import WRAPS, product_table
 from .colour_kernels import PLAIN
 from .cores import core_count
 from .eye import Eye
-from .poses import Poses, Views, as_poses
+from .poses import Poses, Views, poses_of_eye
 from .scanline_kernels import LEAF, draw_views
 from .triangle_tree import TriangleTree
 
@@ -65,7 +65,6 @@ class Rays(NamedTuple):
         tangents: (height,) of the elevations of the rows of rays, which are evenly spaced.
         top: Elevation of the upper edge (rad).
         rows_per_rad: Rows of rays in one radian of elevation.
-        z: Height of the eye (m).
         per_pixel: Rays along each side of a pixel.
     """
 
@@ -73,7 +72,6 @@ class Rays(NamedTuple):
     tangents: np.ndarray
     top: float
     rows_per_rad: float
-    z: float
     per_pixel: int
 
 
@@ -178,7 +176,7 @@ class ScanlineRenderer:
         elevations = eye.elevations(eye.rays)
         rows_per_rad = len(elevations) / (eye.top - eye.bottom)
         azimuths = column_azimuths(eye.width * eye.rays)
-        rays = Rays(azimuths, np.tan(elevations), eye.top, rows_per_rad, eye.z, eye.rays)
+        rays = Rays(azimuths, np.tan(elevations), eye.top, rows_per_rad, eye.rays)
         covered = np.column_stack([rgb, np.full(len(rgb), 255)])[::-1]
         colours = np.vstack([[*world.sky_rgb, 0], covered]).astype("<u2").view("<i8")[:, 0]
         weights = np.cos(elevations).reshape(eye.height, eye.rays)
@@ -189,7 +187,7 @@ class ScanlineRenderer:
         self._threads = threads or core_count()
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(self._threads)
         # Drawing nothing compiles the loops, or loads what was compiled.
-        self._draw(np.empty((0, 3)), np.empty((0, eye.height, eye.width, 4), dtype=np.uint8), 0, eye.width)
+        self._draw(np.empty((0, 4)), np.empty((0, eye.height, eye.width, 4), dtype=np.uint8), 0, eye.width)
 
     def __reduce__(self):
         """In another process it is opened anew."""
@@ -199,7 +197,7 @@ class ScanlineRenderer:
         """See `Renderer.render`. Each thread draws some of the poses, or a strip of columns where there is only one."""
         if self._pool is None:
             raise InputError("this renderer is closed; open another one")
-        poses = as_poses(poses)
+        poses = poses_of_eye(self.world, self.eye, poses)
         views = np.empty((len(poses), self.eye.height, self.eye.width, 4), dtype=np.uint8)
         if len(poses) == 1:
             edges = np.linspace(0, self.eye.width, self._threads + 1).astype(int).tolist()
@@ -214,7 +212,7 @@ class ScanlineRenderer:
             other.result()
         return views
 
-    def _draw(self, poses: Float[np.ndarray, "n 3"], views: Views, start: int, stop: int) -> None:
+    def _draw(self, poses: Float[np.ndarray, "n 4"], views: Views, start: int, stop: int) -> None:
         """Draw columns start..stop-1 of the views at some poses."""
         try:
             keys = self._scratch.pop()

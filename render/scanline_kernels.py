@@ -270,17 +270,17 @@ def draw_views(triangles, rays, paint, lookup, poses, start, stop, keys, views):
     Args:
         triangles, rays, paint: `Triangles`, `Rays` and `Paint` as plain tuples, which numba accepts faster.
         lookup: `Lookup` likewise; None in a plain world.
-        poses: (n, 3) x (m), y (m) and heading (rad).
+        poses: (n, 4) x (m), y (m), heading (rad) and height (m) of the eye.
         start, stop: Columns of pixels.
         keys: (width, height) of rays, int64, to work in: the `_key` of the nearest triangle so far, 0 for the sky.
         views: (n, height, width) of pixels, which become red, green, blue and alpha in 8 bits each, red lowest.
     """
-    azimuths, tangents, top, rows_per_rad, z, n = rays
+    azimuths, tangents, top, rows_per_rad, n = rays
     colours, weights = paint
     width, height = keys.shape
     directions = np.empty((2, width))
     for i in range(len(poses)):
-        x, y, heading = poses[i]
+        x, y, heading, z = poses[i]
         directions[0], directions[1] = np.cos(azimuths + heading), np.sin(azimuths + heading)
         view = _View(x, y, z, heading, top, rows_per_rad, width, height, start * n, stop * n)
         keys[start * n : stop * n] = 0

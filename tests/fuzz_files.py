@@ -50,7 +50,7 @@ EYE = Eye(width=8, height=3, samples=1)
 
 
 def read_and_draw(path) -> None:
-    """Read a world, draw it and write it again, unless it is refused."""
+    """Read a world, draw it, stand on its mesh and write it again, unless it is refused."""
     world = answer(path, lambda: read_world(path))
     if world is None:
         return
@@ -59,6 +59,11 @@ def read_and_draw(path) -> None:
         with renderer:
             x, y = (world.field.x_min + world.field.x_max) / 2, (world.field.y_min + world.field.y_max) / 2
             answer(None, lambda: renderer.render([(x, y, 0.0), (0.0, 0.0, 1.0)]))
+    standing = answer(None, world.on_mesh)
+    if standing is not None:
+        triangle = standing.terrain.triangles[standing.terrain.is_ground][-1:, :, :2].astype(float)
+        heights = standing.ground_height(np.concatenate([triangle[0], triangle.mean(axis=1)]))
+        assert np.isnan(heights).all() or np.nanmax(np.abs(heights)) <= 1e7
     again = path.with_name("again.glb")
     answer(again, lambda: write_world(world, again))
 

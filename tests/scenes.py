@@ -46,6 +46,39 @@ def textured_world(textures, seed: int = 0, n: int = 60, *, colours: bool = Fals
     return dataclasses.replace(world, texturing=Texturing(textures=tuple(textures), index=index, uv=uv, colours=corner))
 
 
+def hills(step: float = 0.2, height: float = 0.3) -> np.ndarray:
+    """Triangles of hills over (0, 0) to (6, 6), in squares of `step`."""
+    return surface(lambda x, y: height * np.sin(1.3 * x) * np.cos(1.1 * y), step)
+
+
+def surface(z, step: float = 0.2, low: float = 0.0, high: float = 6.0) -> np.ndarray:
+    """Triangles, two in each square of `step`, between points of the surface z(x, y)."""
+    along = np.linspace(low, high, round((high - low) / step) + 1)
+    x, y = np.meshgrid(along, along)
+    points = np.stack([x, y, z(x, y) + 0 * x], axis=-1)
+    a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
+    return np.concatenate([np.stack(each, axis=2).reshape(-1, 3, 3) for each in ((a, b, c), (a, c, d))])
+
+
+def post(x: float, y: float, z: float, height: float = 0.5, width: float = 0.08) -> np.ndarray:
+    """Triangles of an upright box without a bottom, with a flat top, on (x, y, z)."""
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * width / 2
+    low = np.column_stack([corners + (x, y), np.full(4, z)])
+    high = low + (0, 0, height)
+    sides = [[(low[i], low[j], high[j]), (low[i], high[j], high[i])] for i, j in ((0, 1), (1, 2), (2, 3), (3, 0))]
+    return np.array([*(triangle for side in sides for triangle in side), high[[0, 1, 2]], high[[0, 2, 3]]])
+
+
+def mesh_world(*parts: np.ndarray, **fields) -> World:
+    """A world of triangles in a colour for each part, as a mesh that somebody brings: without a ground, its field is its extent."""
+    triangles = np.concatenate(parts).astype(np.float32)
+    colours = np.random.default_rng(len(parts)).integers(0, 256, (len(parts), 3)).astype(np.uint8)
+    low, high = triangles[..., :2].min(axis=(0, 1)), triangles[..., :2].max(axis=(0, 1))
+    given = {"ground": None, "sky_rgb": (191, 191, 191), "field": Bounds(*low.tolist(), *high.tolist())}
+    rgb = np.repeat(colours, [len(part) for part in parts], axis=0)
+    return World(triangles=triangles, rgb=rgb, **(given | fields))
+
+
 def random_poses(n: int, seed: int = 1) -> np.ndarray:
     """Poses (n, 3) inside FIELD."""
     rng = np.random.default_rng(seed)

@@ -56,6 +56,8 @@ VALUES: dict[str, st.SearchStrategy] = {
     "eye_height_m": st.floats(-1, 1),
     "top_deg": decimals(0.001, 90),
     "bottom_deg": decimals(-90, 0),
+    "ground": st.sampled_from(["flat", "mesh"]),
+    "max_slope_deg": decimals(1, 89),
     "cull_back_faces": st.booleans(),
     "route": st.just("route.csv"),
     "route_seed": SEEDS,
@@ -192,6 +194,7 @@ def test_what_makes_no_sense_is_refused_where_the_experiment_is_made(settings, w
 
 OTHER: dict[str, Any] = {
     "world": "meadow", "world_seed": 5, "up": "y", "unit": "mm", "scale": 0.5, "strict": True,
+    "ground": "mesh", "max_slope_deg": 30.0,
     "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
     "top_deg": 50.0, "bottom_deg": -20.0, "cull_back_faces": True, "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
     "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "device": "cpu:0",

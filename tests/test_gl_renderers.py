@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scenes import random_poses, random_texture, textured_world
+from scenes import hills, mesh_world, post, random_poses, random_texture, textured_world
 
 from tussock.render import Eye, Renderer, gl, open_renderer
 from tussock.render.cubemap import Cubemap, face_size_for
@@ -180,6 +180,14 @@ def test_back_faces(backend):
             bool((view == (*rgb, 255)).all(-1).any()) for rgb in [(255, 0, 0), (0, 0, 255), SAND]
         )
     assert seen == {True: (True, True, True), False: (True, False, True)}
+
+
+def test_an_eye_stands_on_the_mesh(backend):
+    posts = [post(x, y, 41.6, 1.0) for x, y in np.random.default_rng(1).uniform(0.5, 5.5, (20, 2))]
+    world = mesh_world(hills() + (0, 0, 42), *posts).on_mesh()
+    poses = [Pose(2.0, 2.2, 1.0), Pose(5.0, 4.1, -2.0)]
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
+        assert_agree(ours.render(poses), cpu.render(poses))
 
 
 def test_an_empty_world_is_all_sky(backend):

@@ -8,7 +8,6 @@ import numpy as np
 
 from .materials import Material, white_image
 
-
 _NOT_DRAWN = {"-mm": (0.0, 1.0), "-t": (0.0, 0.0, 0.0)}  # options, with the numbers that change nothing
 
 

@@ -1,11 +1,13 @@
 """Routes that an insect could walk: smooth, with a few corners, clear of all obstacles.
 
-This works in any world: obstacles are what its triangles cover on the ground, whatever they belong to.
+This works in any world: obstacles are what its triangles cover on the ground, whatever they belong to. Where agents stand on the
+world's mesh (`World.on_mesh`), the ground is no obstacle, heights are those above it, and a route keeps off what is too steep and
+off its edge. Lengths are measured over the x-y plane.
 """
 
 import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
@@ -14,10 +16,9 @@ from scipy.spatial import KDTree
 from .errors import InputError, SettingError
 from .generate import seeded
 from .geometry import Bounds, Route, place_text
+from .obstacles import clearance, footprints
 from .scene import World
 
-BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
-STEP_HEIGHT = 0.008  # m; it walks over what is lower
 MIN_CLEARANCE = 0.04  # m from every obstacle
 PREFERRED_CLEARANCE = 0.12  # m; with less, a path costs more than twice its length
 MIN_LENGTH = 0.1  # m of a route
@@ -28,24 +29,8 @@ MAX_ATTEMPTS = 60
 CELL = 0.02  # m, of the grid of clearances
 MARGIN = 20  # cells around the field, so that obstacles just outside it count
 NODE_SPACING = 3  # cells between the nodes through which paths are planned
+MAX_CHECKED = 10**6  # points of a route
 MAX_CELLS = 4 * 10**7  # of the grid: a field of 126 m x 126 m
-
-
-def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-    """Exact distance from positions (m) to the nearest obstacle (m): 0 inside one, infinite if there is none."""
-    xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-    shapes = _footprints(world)
-    if len(shapes) == 0:
-        return np.full(len(xy), np.inf)
-    middle = shapes.mean(axis=1)
-    radius = np.hypot(*np.moveaxis(shapes - middle[:, None], -1, 0)).max(axis=1)
-    to_corner = KDTree(shapes.reshape(-1, 2)).query(xy)[0]  # the nearest obstacle is not farther than this
-    distance = to_corner.copy()
-    for batch in np.array_split(np.arange(len(xy)), len(xy) // 500 + 1):
-        x, y = (xy[batch, None, i] - middle[:, i] for i in (0, 1))
-        row, shape = np.nonzero(x * x + y * y < (to_corner[batch, None] + radius) ** 2)  # all others are farther
-        np.minimum.at(distance, batch[row], _distance_to(shapes[shape], xy[batch[row]]))
-    return distance
 
 
 def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[float, ...] | None = None) -> Route:
@@ -83,7 +68,12 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
             continue
         for smoothing in (0.16, 0.11, 0.07, 0.045):
             route = _smoothed(path, smoothing, length)
-            if route is not None and _is_valid(route, inside) and clearance(world, route).min() >= MIN_CLEARANCE:
+            if (
+                route is not None
+                and _is_valid(route, inside)
+                and clearance(world, route).min() >= MIN_CLEARANCE
+                and _first_off_ground(world, route) is None
+            ):
                 return Route.through(route if goal is None else route[::-1])
     raise InputError(
         f"found no route of {length:.2f} m in the field ({field}) that keeps {100 * MIN_CLEARANCE:g} cm clear of plants; "
@@ -98,13 +88,31 @@ def check_length(length: float) -> None:
 
 
 def check_route(world: World, route: Route) -> None:
-    """Refuse a route that leaves the world. Raises InputError."""
+    """Refuse a route that leaves the world or its ground. Raises InputError."""
     inside = world.field.contains(*route.xy.T)
     if not inside.all():
         x, y = route.xy[~inside][0]
         raise InputError(
             f"the route leaves the world ({world.field}) at {place_text(x, y)}; choose a route of this world"
         )
+    spacing = max(SPACING, route.length / MAX_CHECKED)
+    problem = _first_off_ground(world, route.at(np.arange(0.0, route.length + spacing, spacing))[:, :2])
+    if problem is not None:
+        raise InputError(f"the route cannot be walked: {problem}; choose another route, or give --max-slope-deg")
+
+
+def _first_off_ground(world: World, xy: Float[np.ndarray, "n 2"]) -> str | None:
+    """Why a route through points (m) cannot be walked, at the first point where it leaves the ground or is too steep; None if nowhere."""
+    if world.terrain is None:
+        return None
+    height = world.ground_height(xy)
+    if np.isnan(height).any():
+        return world.terrain.problem(*xy[np.isnan(height).argmax()].tolist())
+    steep = world.terrain.is_too_steep(np.hypot(*np.diff(xy, axis=0).T), np.diff(height))
+    if not steep.any():
+        return None
+    (x, y), (before, after) = xy[steep.argmax()].tolist(), height[steep.argmax() :][:2].tolist()
+    return f"the ground rises from {before:g} to {after:g} m at {place_text(x, y)}"
 
 
 def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
@@ -114,6 +122,8 @@ def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
     x, y = goal
     if not (np.isfinite(goal).all() and inside.contains(x, y)):
         raise SettingError(f"a goal at {place_text(x, y)}; choose one inside the field, off its edge ({inside})")
+    if world.terrain is not None and not world.stands(np.array([goal]))[0]:
+        raise SettingError(f"a goal at {place_text(x, y)}: {world.terrain.problem(x, y)}; choose another one")
     room = float(clearance(world, np.array([goal]))[0])
     if room < PREFERRED_CLEARANCE:
         raise SettingError(
@@ -121,49 +131,32 @@ def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
         )
 
 
-def _footprints(world: World) -> Float[np.ndarray, "n 6 2"]:
-    """The part of each triangle between ground and body height, seen from above: a convex shape, its corners in order.
-
-    Going around the edges of a triangle, the part of each edge between the heights gives two corners. At most one edge is
-    completely outside; it repeats the corner before.
-    """
-    z = world.triangles[:, :, 2]
-    start = world.triangles[(z.max(axis=1) >= STEP_HEIGHT) & (z.min(axis=1) <= BODY_HEIGHT)].astype(np.float64)
-    step = np.roll(start, -1, axis=1) - start
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bounds = (np.array([0.0, BODY_HEIGHT]) - start[:, :, 2:]) / step[:, :, 2:]  # shares of the edge; nan if level
-    enter, leave = np.fmax(bounds.min(axis=2), 0.0), np.fmin(bounds.max(axis=2), 1.0)
-    level = step[:, :, 2] == 0
-    outside = np.where(level, (start[:, :, 2] < 0) | (start[:, :, 2] > BODY_HEIGHT), enter > leave)
-    enter, leave = np.where(level, 0.0, enter), np.where(level, 1.0, leave)
-    first = start[:, :, :2] + enter[:, :, None] * step[:, :, :2]
-    last = start[:, :, :2] + leave[:, :, None] * step[:, :, :2]
-    before = np.roll(last, 1, axis=1)
-    first, last = (np.where(outside[:, :, None], before, corner) for corner in (first, last))
-    return np.stack([first, last], axis=2).reshape(-1, 6, 2)
-
-
-def _distance_to(shapes: Float[np.ndarray, "n 6 2"], xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-    """Distance (m) of each point to the convex shape of the same row; 0 inside."""
-    side, offset = np.roll(shapes, -1, axis=1) - shapes, xy[:, None] - shapes
-    squared = (side**2).sum(axis=2)
-    share = np.clip((side * offset).sum(axis=2) / np.where(squared > 0, squared, 1.0), 0, 1)
-    distance = np.hypot(*np.moveaxis(offset - share[..., None] * side, -1, 0)).min(axis=1)
-    turn = side[..., 0] * offset[..., 1] - side[..., 1] * offset[..., 0]  # twice the area of (corner, corner, point)
-    within = ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)) & (np.abs(turn.sum(axis=1)) > 1e-10)
-    return np.where(within, 0.0, distance)
-
-
 def _clearance_grid(world: World, inside: Bounds) -> Float[np.ndarray, "rows columns"]:
     """Clearance (m), to about a cell, on a grid from the lower left corner of `inside`; rows run along y."""
     size = np.ceil(inside.size / CELL).astype(int) + 1 + 2 * MARGIN
     free = np.full((size[1], size[0]), 255, np.uint8)
-    cells = (_footprints(world) - np.array(inside[:2])) / CELL + MARGIN
+    cells = (footprints(world) - np.array(inside[:2])) / CELL + MARGIN
     visible = np.logical_and(cells.max(axis=1) > 0, cells.min(axis=1) < size).all(axis=1)
     for shape in np.round(cells[visible] * 16).astype(np.int32):
         cv2.fillConvexPoly(free, shape, 0, shift=4)
+    if world.terrain is not None:
+        free[_is_off_ground(world, inside, size)] = 0
     distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * CELL
     return distance[MARGIN:-MARGIN, MARGIN:-MARGIN]
+
+
+def _is_off_ground(world: World, inside: Bounds, size: Int[np.ndarray, "2"]) -> Bool[np.ndarray, "rows columns"]:
+    """Which cells of the grid of clearances have no ground, or ground that is too steep to a neighbour."""
+    assert world.terrain is not None
+    x, y = (np.arange(-MARGIN, n - MARGIN) * CELL + low for n, low in zip(size, inside[:2], strict=True))
+    height = np.stack([world.ground_height(np.column_stack([x, np.full(len(x), row)])) for row in y])
+    off = np.isnan(height)
+    for axis in (0, 1):
+        here, there = off.swapaxes(0, axis)[:-1], off.swapaxes(0, axis)[1:]  # views: they change `off`
+        steep = world.terrain.is_too_steep(CELL, np.diff(height, axis=axis)).swapaxes(0, axis)
+        here |= steep
+        there |= steep
+    return off
 
 
 def _path_graph(grid: Float[np.ndarray, "rows columns"], inside: Bounds) -> tuple[Float[np.ndarray, "n 2"], csr_array]:

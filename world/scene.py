@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float, Float32, UInt8
 
 from .errors import SettingError
 from .generate import GENERATOR, generate_plants
 from .geometry import Bounds
 from .params import WORLDS, WorldParams, preset_of
 from .settings import MAX_COORDINATE, RGB
+from .terrain import MAX_SLOPE, Terrain
 from .textures import Texturing
 
 
@@ -51,7 +52,7 @@ class World:
     """Everything that can be seen. Immutable.
 
     Attributes:
-        triangles: (n, 3, 3) corners: triangle, corner, xyz (m, z up, ground at z = 0).
+        triangles: (n, 3, 3) corners: triangle, corner, xyz (m, z up).
         rgb: (n, 3) one colour per triangle.
         ground: The ground, or None.
         sky_rgb: Colour of the sky.
@@ -61,6 +62,7 @@ class World:
         origin_m: What was subtracted from the coordinates of the file (m): they are those of the world plus this.
         texturing: Textures and corner colours of the triangles, or None. `rgb` is then the mean colour of each triangle, which
             maps and recordings show; the renderers draw the texturing.
+        terrain: The ground of the mesh, which agents stand on (see `on_mesh`); None: they stand at z = 0.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -72,6 +74,7 @@ class World:
     origin: dict[str, Any] = dataclasses.field(default_factory=dict)
     origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     texturing: Texturing | None = None
+    terrain: Terrain | None = None
 
     def __post_init__(self):
         n = len(self.triangles)
@@ -123,6 +126,26 @@ class World:
             field=made.field,
             origin={"generator": GENERATOR, "preset": preset_of(made), "seed": int(seed), "params": made.to_dict()},
         )
+
+    def on_mesh(self, max_slope: float = MAX_SLOPE) -> "World":
+        """The same world, where agents stand on its triangles (and `ground`); terrain.py explains on which of them.
+
+        Args:
+            max_slope: Steepest ground that can be stood and walked on (rad).
+
+        Raises:
+            InputError: Where nothing can be stood on.
+        """
+        terrain = Terrain.of(self.surfaces()[0], float(np.prod(self.field.size)), max_slope)
+        return dataclasses.replace(self, terrain=terrain)
+
+    def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+        """Height of the ground at positions (both m): 0, or that of the terrain, where there is one; nan where it has no ground."""
+        return np.zeros(len(xy)) if self.terrain is None else self.terrain.height(xy)
+
+    def stands(self, xy: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
+        """Whether there is ground at positions (m)."""
+        return ~np.isnan(self.ground_height(xy))
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
         """Triangles and colours, with the two triangles of the ground (facing up) at the end: what a renderer draws."""

@@ -37,6 +37,7 @@ class EvaluateCommand(ModelOptions):
         experiment = self.experiment()
         world, route = experiment.open_world_and_route()
         positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
+        positions = positions[world.stands(positions)]
         with open_renderer(experiment, world) as renderer:
             message(f"renderer: {renderer.backend}")
             with progress("learning", "views") as report:
@@ -146,6 +147,7 @@ class CompareCommand(LearningOptions):
             experiment.replace(model=spec)  # refuses bad parameters before the work begins
         world, route = experiment.open_world_and_route()
         positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
+        positions = positions[world.stands(positions)]
         rows = {}
         with open_renderer(experiment, world) as renderer, progress("comparing", "models") as report:
             report(0, len(specs))

@@ -91,6 +91,10 @@ class ViewOptions(MeshOptions):
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = default(Surroundings, "world")
     world_seed: int | None = None
     """Seed of a generated world. Default: --seed."""
+    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = default(Surroundings, "ground")
+    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md)."""
+    max_slope_deg: float = degrees(default(Surroundings, "max_slope"))
+    """Steepest ground of a mesh that can be stood and walked on."""
     seed: int = default(Surroundings, "seed")
     """Seed of everything random: the world and route where they are generated, the model's start, the heading noise."""
     size: str | None = None
@@ -100,7 +104,7 @@ class ViewOptions(MeshOptions):
     samples: int | None = None
     """Rays along each side of a pixel. Default: 1 where a pixel is at most a degree wide, else 4."""
     eye_height_m: float = default(Eye, "z")
-    """Height of the eye above z = 0."""
+    """Height of the eye above the ground."""
     top_deg: float = degrees(default(Eye, "top"))
     """Elevation of a panorama's upper edge."""
     bottom_deg: float = degrees(default(Eye, "bottom"))

@@ -96,6 +96,10 @@ class RouteCommand(MeshOptions):
     """Find a walkable route through a world and save it; several seeds and one goal give several routes to one place."""
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
+    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = "flat"
+    """flat: the route is at z = 0. mesh: it is on the ground of the world's mesh, as of a scan (docs/your-data.md)."""
+    max_slope_deg: float = 45.0
+    """Steepest ground of a mesh that can be walked on."""
     seed: int = 0
     """The same seed gives the same route (and world, where it is generated)."""
     route_seed: int | None = None
@@ -120,7 +124,13 @@ class RouteCommand(MeshOptions):
         check_writable(self.out)
         check_picture(self.picture)
         goal = None if self.goal is None else numbers(self.goal, "--goal", "X,Y", "5,5")
-        world = Surroundings(world=self.world, seed=self.seed, reading=self.reading()).open_world()
+        world = Surroundings(
+            world=self.world,
+            seed=self.seed,
+            reading=self.reading(),
+            ground=self.ground,
+            max_slope=math.radians(self.max_slope_deg),
+        ).open_world()
         if goal is not None:
             goal = tuple(local_xy(world, [goal], "--goal")[0].tolist())
         seed = self.seed if self.route_seed is None else self.route_seed

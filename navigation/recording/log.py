@@ -134,11 +134,12 @@ class Recording:
         normals = np.tile(np.array([0, 0, 1], dtype=np.float32), (len(corners), 1))
         mesh = rr.Mesh3D(vertex_positions=corners, vertex_colors=np.repeat(rgb, 3, axis=0), vertex_normals=normals)
         self._log("world/mesh", mesh, static=True)
-        line, goal = _above(route.xy), _above(route.xy[-1:])
+        line = self._above(route.xy)
+        goal = line[-1:]
         self._log("world/route", rr.LineStrips3D([line], colors=ROUTE_COLOUR, radii=0.008), static=True)
         self._log("world/goal", rr.Points3D(goal, colors=ROUTE_COLOUR, radii=0.06), static=True)
         if self._training_poses is not None:
-            points = _above(self._training_poses[:, :2])
+            points = self._above(self._training_poses[:, :2])
             self._log("world/learned_views", rr.Points3D(points, colors=LEARNED_COLOUR, radii=0.006), static=True)
         names = {"deviation/m": "deviation from the route (m)", "error/degrees": "heading error (degrees)"}
         for (entity, name), colour in zip(names.items(), (PATH_COLOUR, MATCH_COLOUR), strict=True):
@@ -169,12 +170,12 @@ class Recording:
         """Log what changes from step to step, and before the first one what does not."""
         if self._previous is None:
             self._log_constants(steps[0])
-        here = _above(np.array([step.pose[:2] for step in steps]))
+        here = np.array([_place(step) for step in steps])
         facing = _directions(np.array([step.pose.heading + step.turn for step in steps]), 0.2)
         self._send("world/agent", steps, rr.Arrows3D.columns(origins=here, vectors=facing))
         known = steps if self._previous is None else [self._previous, *steps]
         walked = [(before, step) for before, step in pairwise(known) if step.reset is None]
-        strips = [_above(np.array([before.pose[:2], step.pose[:2]])) for before, step in walked]
+        strips = [np.array([_place(before), _place(step)]) for before, step in walked]
         self._send("world/path", [step for _, step in walked], rr.LineStrips3D.columns(strips=strips))
         seen = [step for step in steps if step.view is not None]
         if seen:
@@ -200,7 +201,7 @@ class Recording:
             return
         poses = self._training_poses[np.array([step.match for step in steps])]
         self._send("recognised", steps, _images(self._renderer.render(poses)))
-        arrows = rr.Arrows3D.columns(origins=_above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
+        arrows = rr.Arrows3D.columns(origins=self._above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
         self._send("world/recognised", steps, arrows)
 
     def _send_causes(self, poor: list[tuple[Step, Diagnosis]]) -> None:
@@ -214,10 +215,14 @@ class Recording:
             self._labelled = self._labelled if close else (cause, step.pose)
         for cause, marked in marks.items():
             steps, labels = [step for step, _ in marked], [label for _, label in marked]
-            positions = [(*step.pose[:2], MARKS_ABOVE) for step in steps]
+            positions = [_place(step, MARKS_ABOVE) for step in steps]
             shown = [label != "" for label in labels]
             columns = rr.Points3D.columns(positions=positions, labels=labels, show_labels=shown)
             self._send(cause_entity(cause), steps, columns)
+
+    def _above(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
+        """Points a little above the ground."""
+        return np.column_stack([xy, self._renderer.world.ground_height(xy) + ABOVE])
 
     def _log_events(self, steps: list[tuple[Step, Diagnosis | None]]) -> None:
         """What happened at a step, where anything did."""
@@ -230,9 +235,9 @@ class Recording:
                 self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
 
 
-def _above(xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
-    """Points a little above the ground."""
-    return np.column_stack([xy, np.full(len(xy), ABOVE)])
+def _place(step: Step, above: float = ABOVE) -> tuple[float, float, float]:
+    """The place of an agent at a step, a little above the ground."""
+    return *step.pose[:2], step.height + above
 
 
 def _directions(headings: Float[np.ndarray, " n"], length: float) -> Float[np.ndarray, "n 3"]:

@@ -114,7 +114,8 @@ def draw_arrows(axes: Axes, x, y, heading_deg, colour, length=ARROW, **style) ->
 
 def _draw_world(axes: Axes, world: World) -> None:
     triangles, rgb = world.surfaces()
-    order = triangles[..., 2].max(axis=1).argsort(kind="stable")  # lower ones first, so that higher ones cover them
+    above_ground = triangles[..., 2].max(axis=1) - np.nan_to_num(world.ground_height(triangles[..., :2].mean(axis=1)))
+    order = above_ground.argsort(kind="stable")  # lower ones first, so that higher ones cover them
     surfaces = PolyCollection(
         list(triangles[order, :, :2]),
         facecolors=rgb[order] / 255,

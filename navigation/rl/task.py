@@ -16,14 +16,14 @@ from tussock.world.errors import SettingError
 from tussock.world.geometry import Pose, Route
 from tussock.world.params import is_generated
 from tussock.world.scene import World
-from tussock.world.settings import instance_of, number, settings, whole
+from tussock.world.settings import choice, instance_of, number, settings, whole
 
 from ..body import Body
 from ..encoding import Encoding
 from ..experiment import Experiment
 from ..steering.navigator import Motion
 from ..stopping import StoppingRules, StopReason
-from ..surroundings import Surroundings
+from ..surroundings import GROUNDS, Surroundings
 from ..training import training_poses, training_views
 from ..training_setup import TrainingSetup
 from ..walk import Walk, check_inside
@@ -55,6 +55,7 @@ class RouteTask:
     Attributes:
         world: A preset's name, a file, or a `World`.
         world_seed: Of the world and the route, where they are generated.
+        ground: "flat": the learner moves at z = 0. "mesh": it stands on the surface of the world's mesh beneath it.
         worlds: How many worlds there are, of the seeds from `world_seed` on; each episode is in one of them, at random.
         route: A `Route`, its file, or None to generate one.
         length: Of a generated route (m).
@@ -72,6 +73,7 @@ class RouteTask:
 
     world: Any = instance_of(str | os.PathLike | World, SURROUNDINGS.world, "a preset's name, a file or a World")
     world_seed: int = whole(0, low=0)
+    ground: str = choice(SURROUNDINGS.ground, GROUNDS)
     worlds: int = whole(1)
     route: Any = instance_of(Route | str | os.PathLike | None, None, "a Route or its file")
     length: float = number(SURROUNDINGS.route_length, low=0.1, unit="m")
@@ -101,6 +103,7 @@ class RouteTask:
         """The experiment that an episode is a walk of, in the first world."""
         return Experiment(
             world=self.world,
+            ground=self.ground,
             route=self.route,
             route_length=self.length,
             eye=self.eye,
@@ -135,7 +138,7 @@ class Courses:
             experiment = self.task.experiment.replace(seed=seed)
             world, route = experiment.open_world_and_route()
             for side in (-1, 1):
-                check_inside(route.start.moved(0.0, side * self.task.offset), world.field)
+                check_inside(route.start.moved(0.0, side * self.task.offset), world)
             self._open[seed] = Course(experiment.open_renderer(world), route)
         return self._open[seed]
 
@@ -175,6 +178,7 @@ class Courses:
             learning_walk=given.learning_walk,
             field=course.renderer.world.field,
         )
+        poses = poses[course.renderer.world.stands(poses[:, :2])]
         if self.task.chain is None:
             return self.task.encoded(course.renderer.render(poses)), poses
         views, kept = training_views(self.task.chain, course.renderer, poses)

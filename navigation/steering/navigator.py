@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int
 
+from tussock.world.errors import SettingError
+
 Images = Float32[torch.Tensor, "n h w"]
 
 
@@ -83,3 +85,19 @@ class Navigator(Protocol):
             memories: What each of them remembers, as `begin` made it; changed in place.
         """
         ...
+
+
+def check_motion(motion: Motion, n: int, navigator: Navigator) -> None:
+    """Refuse a motion that n agents cannot make. Raises SettingError."""
+    step = np.ones(n) if motion.step is None else np.asarray(motion.step)
+    valid = (
+        np.shape(motion.turn) == step.shape == (n,)
+        and np.isfinite(motion.turn).all()
+        and (step >= 0).all()
+        and (step <= 1).all()
+    )
+    if not valid:
+        raise SettingError(
+            f"{type(navigator).__name__} decided to turn by {motion.turn} and to step by {motion.step}; it must return {n} finite turns "
+            "(rad) and, if any, as many shares of a step, from 0 to 1"
+        )

@@ -1,0 +1,77 @@
+"""Obstacles: what the triangles of a world cover on the ground, between the heights that an insect walks over and walks under."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from .scene import World
+from .terrain import STEP_HEIGHT, Terrain
+
+BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
+
+
+def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """Exact distance from positions (m) to the nearest obstacle (m): 0 inside one, infinite if there is none.
+
+    Steep ground and the edge of the ground do not count.
+    """
+    xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+    shapes = footprints(world)
+    if len(shapes) == 0:
+        return np.full(len(xy), np.inf)
+    middle = shapes.mean(axis=1)
+    radius = np.hypot(*np.moveaxis(shapes - middle[:, None], -1, 0)).max(axis=1)
+    to_corner = KDTree(shapes.reshape(-1, 2)).query(xy)[0]  # the nearest obstacle is not farther than this
+    distance = to_corner.copy()
+    for batch in np.array_split(np.arange(len(xy)), len(xy) // 500 + 1):
+        x, y = (xy[batch, None, i] - middle[:, i] for i in (0, 1))
+        row, shape = np.nonzero(x * x + y * y < (to_corner[batch, None] + radius) ** 2)  # all others are farther
+        np.minimum.at(distance, batch[row], _distance_to(shapes[shape], xy[batch[row]]))
+    return distance
+
+
+def footprints(world: World) -> Float[np.ndarray, "n 6 2"]:
+    """The part of each triangle between ground and body height, seen from above: a convex shape, its corners in order.
+
+    Going around the edges of a triangle, the part of each edge between the heights gives two corners. At most one edge is
+    completely outside; it repeats the corner before.
+    """
+    triangles = world.triangles if world.terrain is None else _above_ground(world.triangles, world.terrain)
+    z = triangles[:, :, 2]
+    start = triangles[(z.max(axis=1) >= STEP_HEIGHT) & (z.min(axis=1) <= BODY_HEIGHT)].astype(np.float64)
+    step = np.roll(start, -1, axis=1) - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounds = (np.array([0.0, BODY_HEIGHT]) - start[:, :, 2:]) / step[:, :, 2:]  # shares of the edge; nan if level
+    enter, leave = np.fmax(bounds.min(axis=2), 0.0), np.fmin(bounds.max(axis=2), 1.0)
+    level = step[:, :, 2] == 0
+    outside = np.where(level, (start[:, :, 2] < 0) | (start[:, :, 2] > BODY_HEIGHT), enter > leave)
+    enter, leave = np.where(level, 0.0, enter), np.where(level, 1.0, leave)
+    first = start[:, :, :2] + enter[:, :, None] * step[:, :, :2]
+    last = start[:, :, :2] + leave[:, :, None] * step[:, :, :2]
+    before = np.roll(last, 1, axis=1)
+    first, last = (np.where(outside[:, :, None], before, corner) for corner in (first, last))
+    return np.stack([first, last], axis=2).reshape(-1, 6, 2)
+
+
+def _above_ground(triangles: Float[np.ndarray, "n 3 3"], terrain: Terrain) -> Float[np.ndarray, "m 3 3"]:
+    """Those triangles that are not ground, with the heights of their corners above the ground there.
+
+    A corner off the ground takes the lowest ground under the others. A triangle that is off the ground altogether is left out:
+    nothing can walk there.
+    """
+    others = triangles[~terrain.is_ground[: len(triangles)]].astype(np.float64)
+    ground = terrain.height(others[..., :2].reshape(-1, 2)).reshape(-1, 3)
+    lowest = np.fmin.reduce(ground, axis=1)
+    others[..., 2] -= np.where(np.isnan(ground), lowest[:, None], ground)
+    return others[np.isfinite(lowest)]
+
+
+def _distance_to(shapes: Float[np.ndarray, "n 6 2"], xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """Distance (m) of each point to the convex shape of the same row; 0 inside."""
+    side, offset = np.roll(shapes, -1, axis=1) - shapes, xy[:, None] - shapes
+    squared = (side**2).sum(axis=2)
+    share = np.clip((side * offset).sum(axis=2) / np.where(squared > 0, squared, 1.0), 0, 1)
+    distance = np.hypot(*np.moveaxis(offset - share[..., None] * side, -1, 0)).min(axis=1)
+    turn = side[..., 0] * offset[..., 1] - side[..., 1] * offset[..., 0]  # twice the area of (corner, corner, point)
+    within = ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)) & (np.abs(turn.sum(axis=1)) > 1e-10)
+    return np.where(within, 0.0, distance)
