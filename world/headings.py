@@ -150,18 +150,18 @@ def diagnose(poses: Float[np.ndarray, "n 3"], read_as: str = "ccw") -> Diagnosis
     fits = [_Fit.of(chords, headings) for chords in _scales(poses[:, :2])]
     if not fits:
         return Diagnosis("follows", np.nan)
-    fit = min(
-        fits, key=lambda each: min(each.off.values()) + FIT / len(each.remainder[read_as])
-    )  # many chords say more
+    fit = min(fits, key=lambda each: min(each.off.values()) + 2 * FIT / each.chords)  # many chords say more
     off, least = fit.off[read_as], min(each.off[read_as] for each in fits)
     others = {name: value for name, value in fit.off.items() if name != read_as and value < min(FIT, least / 2)}
     best = min(others, key=lambda name: others[name], default=None)
     if best is not None and least > SAME and fit.explains(best) and not fit.explains(read_as):
         return Diagnosis("convention", off, best)
-    mean = float(np.angle(fit.remainder[read_as].mean()))
-    if not np.ptp(numbers) and least > (SAME if abs(mean) > SAME and len(fits[0].remainder[read_as]) > 4 else FIT):
+    mean, several = float(np.angle(fit.remainder[read_as].mean())), fits[0].chords > 4
+    if not np.ptp(numbers) and least > (SAME if abs(mean) > SAME and several else FIT):
         best = best if fit.spread < NEARLY_STRAIGHT else None
-        return Diagnosis("constant" if numbers.any() else "zero", off, best, float(wrap_angle(numbers[0])))
+        return Diagnosis(
+            "constant" if numbers.any() or not several else "zero", off, best, float(wrap_angle(numbers[0]))
+        )
     if least <= FIT or (len(poses) < 4 and least <= OFF):
         return Diagnosis("follows", least)
     if least > OFF and _deviation(np.exp(1j * numbers)) < CONSTANT:
@@ -242,6 +242,11 @@ class _Fit:
             remainder[name] = np.exp(1j * np.angle(mean * chords.direction.conj()))
         off = {name: float(np.median(np.abs(np.angle(each)))) for name, each in remainder.items()}
         return cls(off, remainder, 1 - float(np.abs(chords.direction.mean())))
+
+    @property
+    def chords(self) -> int:
+        """Number of chords."""
+        return len(next(iter(self.remainder.values())))
 
     def explains(self, name: str) -> bool:
         """Whether headings turn as the path does, which neither constant nor random headings do."""

@@ -70,6 +70,10 @@ def _route(path: Path, points: Points, headings: str, smooth: float) -> Route:
     route = Route(np.column_stack([points.xy, heading]))  # refuses what is not finite, and a single position
     _remark_positions(path, points, route, smooth)
     xy = smoothed(points.xy, smooth) if smooth else points.xy
+    if points.heading is None and headings not in ("auto", "path", "as-is"):
+        logger.warning(
+            "%s has no headings, and --headings %s does nothing: each point faces the next one", path, headings
+        )
     if points.heading is None or headings == "path":
         return Route(np.column_stack([xy, path_directions(xy)]))
     read_as = "bearing" if points.bearing else "ccw"
@@ -108,7 +112,13 @@ def _remark_positions(path: Path, points: Points, route: Route, smooth: float) -
     count, kept = len(points.xy), len(route.xy)
     if points.gaps:
         lines = ", ".join(map(str, points.gaps[:3])) + (", .." if len(points.gaps) > 3 else "")
-        logger.warning("%s: %d rows lack a number and are left out (lines %s)", path, len(points.gaps), lines)
+        logger.warning(
+            "%s: %d of %d rows lack a number and are left out (lines %s)",
+            path,
+            len(points.gaps),
+            count + len(points.gaps),
+            lines,
+        )
     if count - kept > max(2, MANY_REPEATED * count):
         logger.warning("%s: %d of %d points repeat the one before and are left out", path, count - kept, count)
     extent = float(np.ptp(route.xy, axis=0).max())

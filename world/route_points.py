@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .contents import WORLD, described
-from .errors import FileError
+from .errors import FileError, SettingError
 from .route_arrays import read_mat, read_npy, read_npz
 from .route_columns import Column, chosen_column, find_columns, parse_columns
 from .route_tables import columns_of, decode, read_table
@@ -63,6 +63,8 @@ def read_points(path: Path, columns: str | None) -> Points:
     if data.startswith(b"MATLAB") or (suffix == ".mat" and described(data) is None):
         return _of_arrays(read_mat(data), columns)
     if suffix == ".bin":
+        if columns is not None:
+            raise SettingError("--columns are for tables and arrays; an AntWorld .bin has none")
         return _of_planes(data)
     if sentence := described(data):
         raise FileError(f"it is not a route: {sentence}")
@@ -139,7 +141,8 @@ def _of_arrays(arrays: dict[str, np.ndarray], columns: str | None) -> Points:
         if len(chosen) in (2, 3):
             axes = dict(zip(("x", "y", "heading"), chosen, strict=False))
             return _of_columns(
-                {axis: chosen_column(name, axis) for axis, name in axes.items()}, _stacked(arrays, chosen)
+                {axis: chosen_column(name.rpartition(".")[2], axis) for axis, name in axes.items()},
+                _stacked(arrays, chosen),
             )
         array, names = chosen[0], ""
     vectors = [name for name, each in arrays.items() if each.ndim == 1]

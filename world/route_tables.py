@@ -129,10 +129,12 @@ def _rows(lines: list[str], begin: int, separator: str) -> tuple[list[list[str]]
         cells_and_numbers = ((cells, begin + reader.line_num) for cells in reader)
     for cells, number in cells_and_numbers:
         cells = [cell.strip() for cell in cells]
-        if any(cells):
+        if len(cells) > 1 or any(cells):
             rows.append(cells)
             numbers.append(number)
-    return rows, numbers
+    while rows and not any(rows[-1]):  # as spreadsheets leave them
+        rows.pop()
+    return rows, numbers[: len(rows)]
 
 
 def _split(line: str, separator: str) -> list[str]:
