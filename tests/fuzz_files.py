@@ -1,9 +1,12 @@
 """Files of worlds and routes with any content: each is read, or refused in one line that names it."""
 
+import io
 import json
+import logging
 import struct
 
 import numpy as np
+import scipy.io
 import trimesh
 from fuzzing import FOLDER, answer, damaged, damaged_json, holds, main
 from hypothesis import given
@@ -12,6 +15,7 @@ from PIL import Image
 
 from tussock.render import Eye, open_renderer
 from tussock.world.files import read_world, write_world
+from tussock.world.headings import HEADINGS
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
@@ -127,6 +131,39 @@ ROUTES = [
     np.array([[0, 100, 200], [0, 50, 70], [0, 10, 20]], dtype="<f8").tobytes(),
 ]
 odd_numbers = st.floats() | st.sampled_from([1e300, -1e300, 1e154, 1e18, 5e-324, -0.0])
+U = np.linspace(0, 1, 30)
+TABLES = [
+    ("X [mm];Y [mm];yaw (rad)\n" + "\n".join(f"{1e3 * u:.1f};{9e2 * u * u:.1f};{u:.2f}" for u in U))
+    .replace(".", ",")
+    .encode(),
+    ("% a comment\n# x y heading\n" + "\n".join(f"{u:.3f} {u * u:.3f} {45 + u:.1f}" for u in U)).encode(),
+    ("frame\tpos_x\tpos_y\n" + "\n".join(f"{i}\t{u:.3f}\t{u * u:.3f}" for i, u in enumerate(U))).encode("utf-16"),
+    b"X [mm], Y [mm], Heading [degrees], Filename\n1, 2, 3, a.png\n4, 5, , b.png\n",
+]
+
+
+def array_files() -> dict[str, list[bytes]]:
+    """Valid files of arrays, by suffix."""
+    matrix, files = np.column_stack([U, U * U, 45 + U]), {"mat": [], "npy": [], "npz": []}
+    variables = [
+        {"route": matrix},
+        {"s": {"x_mm": U, "y_mm": U * U}, "t": "text"},
+        {"c": np.array([U, "a"], dtype=object), "x": U, "y": U},
+    ]
+    for each in variables:
+        for options in ({}, {"do_compression": True}):
+            stream = io.BytesIO()
+            scipy.io.savemat(stream, each, **options)
+            files["mat"].append(stream.getvalue())
+    for kind, save in (("mat", lambda stream: scipy.io.savemat(stream, variables[0], format="4")), ("npy", lambda stream: np.save(stream, matrix)),
+                       ("npz", lambda stream: np.savez(stream, x=U, y=U)), ("npz", lambda stream: np.savez_compressed(stream, a=matrix))):  # fmt: skip
+        stream = io.BytesIO()
+        save(stream)
+        files[kind].append(stream.getvalue())
+    return files
+
+
+ARRAYS = array_files()
 rows = st.lists(st.tuples(odd_numbers, odd_numbers, odd_numbers), min_size=2, max_size=5)
 
 
@@ -140,9 +177,41 @@ rows = st.lists(st.tuples(odd_numbers, odd_numbers, odd_numbers), min_size=2, ma
     st.sampled_from(["csv", "bin"]),
 )
 def routes(data, kind):
+    use_route(data, kind)
+
+
+headings_flags = st.sampled_from(["auto", "auto", *HEADINGS])
+columns_flags = (
+    st.none()
+    | st.sampled_from(["x,y", "x [mm],y [mm],-,theta", "route", "a:x,y,heading", "x,y,c", ":", ""])
+    | st.text(max_size=8)
+)
+smooth_flags = st.sampled_from([0.0, 0.0, 1e-3, 0.1, 1e3])
+
+
+@holds(200)
+@given(
+    damaged(TABLES) | st.text(max_size=60).map(lambda text: text.encode("utf-16", "surrogatepass")),
+    st.sampled_from(["csv", "txt"]), headings_flags, columns_flags, smooth_flags,
+)  # fmt: skip
+def route_tables(data, kind, headings, columns, smooth):
+    use_route(data, kind, headings, columns, smooth)
+
+
+@holds(200)
+@given(
+    st.sampled_from(list(ARRAYS)).flatmap(lambda kind: st.tuples(st.just(kind), damaged(ARRAYS[kind]) | st.binary(max_size=200))),
+    headings_flags, columns_flags, smooth_flags,
+)  # fmt: skip
+def route_arrays(file, headings, columns, smooth):
+    use_route(file[1], file[0], headings, columns, smooth)
+
+
+def use_route(data: bytes, kind: str, *how) -> None:
+    """Read a route and ask it for all that it knows, unless it is refused."""
     path = FOLDER / f"route.{kind}"
     path.write_bytes(data)
-    route = answer(path, lambda: read_route(path))
+    route = answer(path, lambda: read_route(path, *how))
     if route is not None:
         assert np.isfinite(route.poses).all()
         assert np.isfinite(route.length)
@@ -152,4 +221,5 @@ def routes(data, kind):
 
 
 if __name__ == "__main__":
+    logging.disable()  # remarks on what was assumed
     main()

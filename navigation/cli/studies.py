@@ -98,7 +98,7 @@ class StudyOptions(RouteOptions):
         from ..studies.thesis.study_data import data_of_databases, data_of_world
 
         if self.grid_database is not None and self.route_database is not None:
-            return data_of_databases(self.grid_database, self.route_database)
+            return data_of_databases(self.grid_database, self.route_database, self.headings)
         surroundings = dataclasses.replace(self, seed=seed).surroundings()
         world, route = surroundings.open_world_and_route()
         return data_of_world(world, route, surroundings.eye, spacing=self.spacing_m, backend=self.renderer)

@@ -18,6 +18,7 @@ from PIL import Image
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
+from tussock.world.headings import convert
 
 from .entries import ENTRIES, Columns, read_entries, write_entries
 from .metadata import METADATA, read_metadata, write_metadata
@@ -110,8 +111,12 @@ class Database:
         return read_database(folder)
 
 
-def read_database(folder: str | os.PathLike) -> Database:
+def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database:
     """Open the image database in a folder.
+
+    Args:
+        folder: The folder.
+        headings: How its headings are meant, one of `tussock.world.headings.HEADINGS`; "auto" and "as-is" are bearings.
 
     Raises:
         FileError: Its entries or metadata are missing or damaged, list no images, or name files outside the folder.
@@ -125,7 +130,8 @@ def read_database(folder: str | os.PathLike) -> Database:
     kind = metadata.get("type")
     if kind not in KINDS:
         raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
-    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
+    poses = convert(entries.poses, headings, "bearing")
+    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries) | {"poses": poses})
 
 
 def is_outside(folder: Path, name: str) -> bool:

@@ -123,12 +123,14 @@ def data_of_world(
         )
 
 
-def data_of_databases(grid_folder: Path, route_folder: Path) -> StudyData:
+def data_of_databases(grid_folder: Path, route_folder: Path, headings: str = "auto") -> StudyData:
     """Read the views along a route and on the grid around it.
 
     Args:
         grid_folder: Image database of a grid.
         route_folder: Image database of a route.
+        headings: How the headings of both are meant, one of `tussock.world.headings.HEADINGS`; "path" is for the route alone. "auto"
+            checks that those of the route do not follow another convention than bearings.
 
     Returns:
         The views.
@@ -137,12 +139,13 @@ def data_of_databases(grid_folder: Path, route_folder: Path) -> StudyData:
         FileError: The databases do not fit a study.
         SettingError: They hold too few views.
     """
-    grid, route = _read(grid_folder, "grid"), _read(route_folder, "route")
+    grid = _read(grid_folder, "grid", "auto" if headings == "path" else headings)
+    route = _read(route_folder, "route", headings)
     views = Route(route.poses)
     if len(views.poses) < len(route.poses):
         raise FileError(f"{route_folder}: two successive views have the same position; a study needs them apart")
-    if problem := heading_convention_error(views.poses):
-        raise FileError(f"{route_folder}: {problem}; a study measures against them")
+    if headings == "auto" and (problem := heading_convention_error(views.poses)):
+        raise FileError(f"{route_folder}: {problem}; a study measures against them: give --headings")
     rows = np.flatnonzero(views.nearest(grid.poses[:, :2])[0] <= MAX_DISTANCE)
     _check_enough(views, grid.poses[rows])
     route_views, grid_views = route.views(), grid.views(rows.tolist())
@@ -163,9 +166,9 @@ def data_of_databases(grid_folder: Path, route_folder: Path) -> StudyData:
     )
 
 
-def _read(folder: Path, kind: str) -> Database:
+def _read(folder: Path, kind: str, headings: str) -> Database:
     """The image database in a folder, which must be of a kind and hold panoramas at complete poses."""
-    database = read_database(folder)
+    database = read_database(folder, headings)
     if database.kind != kind:
         raise FileError(f"{database.folder} is a database of a {database.kind}; give one of a {kind}")
     if database.metadata.get("needsUnwrapping"):
