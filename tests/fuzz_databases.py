@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from tussock.render import Eye, open_renderer
 from tussock.render.images.check import check_database
-from tussock.render.images.database import read_database, read_image
+from tussock.render.images.database import read_database
 from tussock.render.images.entries import ENTRIES
 from tussock.render.images.metadata import METADATA, read_metadata, write_metadata
+from tussock.render.images.pictures import read_image
 from tussock.render.images.writing import Grid, write_database
 from tussock.world.geometry import Bounds
 from tussock.world.scene import World

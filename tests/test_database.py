@@ -20,9 +20,10 @@ from tussock.navigation.cli.databases import DatabaseGridCommand
 from tussock.navigation.cli.main import main
 from tussock.render.eye import Eye
 from tussock.render.images.check import check_database
-from tussock.render.images.database import Database, read_database, read_image
+from tussock.render.images.database import Database, read_database
 from tussock.render.images.entries import ENTRIES, stored_poses
 from tussock.render.images.metadata import METADATA, read_metadata, write_metadata
+from tussock.render.images.pictures import read_image
 from tussock.render.images.writing import Grid, write_database
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError, SettingError
@@ -362,8 +363,13 @@ def test_grey_images_have_three_equal_channels_and_sizes_must_agree(tmp_path):
         read_database(folder).views()
 
 
+FRAMES = re.sub(r"image_0000(\d).png", r"\1", PUBLISHED).replace("Filename", "Frame")
+
 BAD = {
-    "a video": (PUBLISHED.replace("Filename", "Frame"), YAML, "frames of a video"),
+    "no frame numbers": (PUBLISHED.replace("Filename", "Frame"), YAML, r"line 2: Frame is 'image_00000\.png'"),
+    "no video": (FRAMES, YAML, "names no videoFile"),
+    "a video above": (FRAMES, YAML + '   videoFile: "../d.png"\n', r"'\.\./d\.png' is not in the folder"),
+    "a frame before the first": (FRAMES.replace("180, 2", "180, -2"), YAML, "line 4: Frame is not a whole number"),
     "no X": (PUBLISHED.replace("X [mm]", "X [m]"), YAML, r"line 1: there is no column 'X \[mm\]'"),
     "no names": (PUBLISHED.replace("Filename", "File"), YAML, "line 1: there is no column 'Filename'"),
     "two X": (PUBLISHED.replace("Y [mm]", "X [mm]"), YAML, r"line 1: the column 'X \[mm\]' .*twice"),
@@ -398,11 +404,10 @@ def test_damaged_databases_are_refused_in_one_line(tmp_path, what):
     assert str(folder) in str(refusal.value)
 
 
-@pytest.mark.parametrize("name", [ENTRIES, METADATA])
-def test_missing_files_are_named(tmp_path, name):
+def test_missing_entries_are_named(tmp_path):
     folder = by_hand(tmp_path / "d", PUBLISHED)
-    (folder / name).unlink()
-    with pytest.raises(InputError, match=f"there is no .*{name}"):
+    (folder / ENTRIES).unlink()
+    with pytest.raises(InputError, match=f"there is no .*{ENTRIES}"):
         read_database(folder)
 
 
