@@ -214,7 +214,8 @@ def check_unwrapping(inspection: Inspection) -> Iterator[Problem]:
     """Raw pictures without a way to unwrap them."""
     if inspection.needs_unwrapping and inspection.usual_shape is not None:
         try:
-            stated_unwrapping(inspection.database.metadata, *inspection.usual_shape, Path(METADATA))
+            height, width = inspection.usual_shape[:2]
+            stated_unwrapping(inspection.database.metadata, height, width, Path(METADATA))
         except FileError as error:
             yield Problem("needs-unwrapping", METADATA, str(error))
 

@@ -1,7 +1,7 @@
 """Writing a database picture by picture, into a folder that can be completed after any interruption."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ def complete(
     folder: Path,
     columns: Columns,
     missing: list[int],
-    make: Callable[[list[int]], Sequence[Picture]],
+    make: Callable[[list[int]], Iterable[Picture]],
     progress: Progress,
     quality: int = 80,
 ) -> None:

@@ -90,8 +90,9 @@ class Database:
                     f"{self.folder / self.label(row)} is {_size(view)}, {self.label(chosen[0])} is {_size(views[0])}; "
                     "give images of one size"
                 )
-        if views and needs_unwrapping(self.metadata, *views[0].shape[:2]):
-            unwrapping = stated_unwrapping(self.metadata, *views[0].shape[:2], self.folder / METADATA)
+        height, width = views[0].shape[:2] if views else (0, 0)
+        if views and needs_unwrapping(self.metadata, height, width):
+            unwrapping = stated_unwrapping(self.metadata, height, width, self.folder / METADATA)
             views = [unwrapping(view) for view in views]
         return np.stack(views) if views else np.empty((0, 0, 0, 3), dtype=np.uint8)
 

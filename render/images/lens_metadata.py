@@ -31,13 +31,14 @@ def stated_unwrapping(metadata: dict[str, Any], height: int, width: int, path: P
     group = group if isinstance(group, dict) else {}
     centre = group.get("centre", group.get("center"))
     radii = [group.get("inner"), group.get("outer")]
-    numbers = [*(centre if isinstance(centre, list) else [None]), *radii]
-    if len(numbers) != 4 or not all(_is_number(each) for each in numbers):
+    values = [*(centre if isinstance(centre, list) else [None]), *radii]
+    numbers = [float(each) for each in values if isinstance(each, int | float) and math.isfinite(each)]
+    if len(values) != 4 or len(numbers) != 4:
         raise FileError(
             f"{path}: the images need unwrapping, and it has no unwrapper with centre, inner and outer; "
             "make panoramas with tussock unwrap, which can find them"
         )
-    x, y, inner, outer = map(float, numbers)
+    x, y, inner, outer = numbers
     if max(numbers) <= 1:  # shares
         x, y, inner, outer = x * width, y * height, inner * height, outer * height
     offset, size = group.get("offsetDegrees", 0), group.get("size")

@@ -10,7 +10,7 @@ from PIL import Image
 
 from tussock.world.errors import FileError
 
-Picture = UInt8[np.ndarray, "height width channels"]
+Picture = UInt8[np.ndarray, "_ _ _"]  # height, width, channels (RGB or RGBA)
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")

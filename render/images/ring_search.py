@@ -13,7 +13,9 @@ from .pictures import Picture
 from .unwrapping import Ring
 
 CORNER = 0.04  # side of the squares in the corners that show the surround, as a share of the picture's shorter side
-MIN_CONTRAST = 16  # grey levels by which the ring differs from its surround; JPEG artefacts of strong edges are about as large
+MIN_CONTRAST = (
+    16  # grey levels by which the ring differs from its surround; JPEG artefacts of strong edges are about as large
+)
 MAX_CORNER_SPREAD = 30  # grey levels between the corners, which show an even surround
 TRIPLES = 3000  # circles that are tried, through three random points each
 MIN_INLIERS = 0.35  # of the outermost points of the ring that must lie on its circle
@@ -47,17 +49,20 @@ def find_ring(pictures: Sequence[Picture]) -> FoundRing:
     lit = _lit(pictures)
     points = _outermost(lit)
     if len(points) < 12:
-        raise FileError("no ring was found: nothing in the picture differs from its corners; give its centre and both radii")
+        raise FileError(
+            "no ring was found: nothing in the picture differs from its corners; give its centre and both radii"
+        )
     centre, outer = _circle_around(points)
     distance = np.hypot(*(points - centre).T)
     on_it = np.abs(distance - outer) <= _tolerance(outer)
     angles = np.arctan2(points[on_it, 1] - centre[1], points[on_it, 0] - centre[0])
-    seen = len(np.unique(np.floor(angles / (2 * np.pi) * 36))) / 36
+    seen = len(np.unique(np.floor(angles / (2 * np.pi) * 36) % 36)) / 36
     if on_it.mean() < MIN_INLIERS or seen * 36 < MIN_SECTORS:
         raise FileError(
             f"no ring was found: the best circle fits {on_it.mean():.0%} of what borders on the surround; give its centre and both radii"
         )
-    return FoundRing((float(centre[0]), float(centre[1])), _inner_radius(lit, centre, outer), float(outer), seen)
+    # The centres of the outermost pixels lie from 0 to 1 pixel inside the circle, on average by a half.
+    return FoundRing((float(centre[0]), float(centre[1])), _inner_radius(lit, centre, outer), float(outer) + 0.5, seen)
 
 
 def draw_ring(picture: Picture, ring: Ring) -> Picture:
@@ -69,7 +74,9 @@ def draw_ring(picture: Picture, ring: Ring) -> Picture:
         cv2.circle(drawn, centre, max(1, round(radius)), (255, 0, 0), thick, cv2.LINE_AA)
     cv2.drawMarker(drawn, centre, (255, 0, 0), cv2.MARKER_CROSS, 8 * thick, thick)
     away = np.array([np.sin(ring.offset), -np.cos(ring.offset)])
-    begin, end = (np.rint(np.array(ring.centre) + radius * away).astype(int).tolist() for radius in (ring.inner, ring.outer))
+    begin, end = (
+        np.rint(np.array(ring.centre) + radius * away).astype(int).tolist() for radius in (ring.inner, ring.outer)
+    )
     cv2.arrowedLine(drawn, begin, end, (0, 255, 0), thick, cv2.LINE_AA, tipLength=0.1)
     return drawn
 
@@ -83,10 +90,16 @@ def _lit(pictures: Sequence[Picture]) -> Bool[np.ndarray, "height width"]:
         if picture.shape[:2] != shape:
             raise FileError("the pictures have different sizes; give pictures of one camera")
         colours = picture[..., :3].astype(np.float32)
-        corners = [colours[y, x].reshape(-1, 3) for y in (slice(side), slice(-side, None)) for x in (slice(side), slice(-side, None))]
+        corners = [
+            colours[y, x].reshape(-1, 3)
+            for y in (slice(side), slice(-side, None))
+            for x in (slice(side), slice(-side, None))
+        ]
         levels = np.array([np.median(corner, axis=0) for corner in corners])
         if np.ptp(levels, axis=0).max() > MAX_CORNER_SPREAD:
-            raise FileError("no ring was found: the corners of the picture are not an even surround; give its centre and both radii")
+            raise FileError(
+                "no ring was found: the corners of the picture are not an even surround; give its centre and both radii"
+            )
         np.maximum(most, np.abs(colours - np.median(levels, axis=0)).max(axis=2), out=most)
     return cv2.medianBlur((most > MIN_CONTRAST).astype(np.uint8), 3).astype(bool)
 

@@ -52,7 +52,7 @@ class Ring:
         bottom: Elevation of the lower edge (rad).
     """
 
-    centre: tuple[float, float] = numbers((0.0, 0.0), low=-MAX_PIXEL, high=MAX_PIXEL, unit="pixels")
+    centre: tuple[float, ...] = numbers((0.0, 0.0), low=-MAX_PIXEL, high=MAX_PIXEL, unit="pixels")
     inner: float = number(low=0, high=MAX_PIXEL, unit="pixels")
     outer: float = number(above=0, high=MAX_PIXEL, unit="pixels")
     offset: float = number(0.0, low=-100, high=100, unit="rad")
@@ -243,7 +243,7 @@ class Unwrapping:
             raise SettingError(f"a panorama from {low:g} to {high:g} degrees; give -90 <= bottom < top <= 90")
 
     def __call__(self, picture: Picture) -> Picture:
-        """The panorama of a picture: interpolated, averaged over a panorama's pixel where that covers several, black where nothing is seen."""
+        """The panorama of a picture: averaged where a pixel covers several of the picture, black where it shows nothing."""
         if max(picture.shape[:2]) > MAX_SIZE:
             raise SettingError(
                 f"a picture of {picture.shape[1]} x {picture.shape[0]}; give sides up to {MAX_SIZE} pixels"
@@ -256,7 +256,7 @@ class Unwrapping:
             return samples
         return cv2.resize(samples, (self.width, self.height), interpolation=cv2.INTER_AREA)
 
-    def seen(self, height: int, width: int) -> Bool[np.ndarray, "height width"]:
+    def seen(self, height: int, width: int) -> Bool[np.ndarray, "rows columns"]:
         """Which pixels of the panorama a picture of a size shows. They may be all."""
         x, y = _base_tables(self)
         margin = 0.5 if isinstance(self.lens, Panorama) else 0.0
