@@ -87,7 +87,11 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
     if not is_video(path):
         raise FileError(damaged)
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # quiet: FFmpeg prints about each damaged byte otherwise
-    capture = cv2.VideoCapture(os.path.abspath(path), cv2.CAP_FFMPEG)  # absolute: a name cannot be taken for an address
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # and OpenCV about each damaged file
+    try:
+        capture = cv2.VideoCapture(os.path.abspath(path), cv2.CAP_FFMPEG)  # absolute: no name is taken for an address
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     try:
         if not capture.isOpened():
             raise FileError(damaged)
