@@ -23,6 +23,9 @@ ROUTE_SETTINGS = (
     "route",
     "route_seed",
     "route_length_m",
+    "headings",
+    "columns",
+    "smooth_m",
 )  # decide world and route
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",

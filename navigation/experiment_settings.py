@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 TYPES: dict[str, Any] = {
     "world": str, "world_seed": int | None, "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
-    "route_seed": int | None, "route_length_m": float, "encoding": str | None, "resize": float | None, "blur": float,
+    "route_seed": int | None, "route_length_m": float, "headings": str, "columns": str | None, "smooth_m": float,
+    "encoding": str | None, "resize": float | None, "blur": float,
     "spacing_m": float, "every": int, "learning_walk_m": float, "device": str, "model": str, "threads": int | None, "step_m": float,
     "offset_m": float, "heading_noise_deg": float, "scan_deg": float | None, "scan_about_deg": float | None, "on_lost": str,
     "waypoint_m": float, "arrive_m": float, "lost_m": float, "patience_m": float, "max_steps": int | None, "navigator": str,
@@ -96,6 +97,9 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "route": None if experiment.route is None else _source(experiment.route, "route"),
         "route_seed": experiment.route_seed,
         "route_length_m": experiment.route_length,
+        "headings": experiment.headings,
+        "columns": experiment.columns,
+        "smooth_m": experiment.smooth,
         "encoding": encoding,
         "resize": resize,
         "blur": blur,
@@ -174,9 +178,20 @@ def _given(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]:
     """The fields of `Surroundings`. known: the eye that a model was trained with."""
-    names = ("world", "world_seed", "cull_back_faces", "route", "route_seed", "seed", "renderer", "threads")
+    names = (
+        "world",
+        "world_seed",
+        "cull_back_faces",
+        "route",
+        "route_seed",
+        "seed",
+        "renderer",
+        "threads",
+        "headings",
+        "columns",
+    )
     fields = {name: given[name] for name in names if name in given}
-    return fields | _values(given, route_length="route_length_m") | {"eye": _eye(given, known)}
+    return fields | _values(given, route_length="route_length_m", smooth="smooth_m") | {"eye": _eye(given, known)}
 
 
 def _eye(given: Mapping[str, Any], known: Eye | None) -> Eye:

@@ -9,7 +9,8 @@ import attrs
 
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
-from tussock.world.settings import choice, instance_of, number, settings, switch, whole
+from tussock.world.headings import HEADINGS
+from tussock.world.settings import choice, instance_of, number, settings, switch, text, whole
 
 if TYPE_CHECKING:
     from tussock.render.renderer import Renderer
@@ -57,6 +58,9 @@ class Surroundings:
         route: A `Route`, its file, or None to generate one.
         route_seed: Of a generated route; None means `seed`.
         route_length: Of a generated route (m).
+        headings: How the headings of a route's file are meant; "auto" reads and checks them. See `read_route`.
+        columns: Names of the columns of a route's file, as "x [mm],y [mm],-,heading"; None takes its own.
+        smooth: Positions of a route's file are averaged along the path with a window of this standard deviation (m); 0 is none.
         eye: What part of the sphere is seen, and how finely.
         seed: Of everything random: world and route where they are generated, and, in an experiment, the model's start and the noise.
         renderer: "auto", "cpu", "egl" or "osmesa".
@@ -69,6 +73,9 @@ class Surroundings:
     route: Any = attrs.field(default=None, converter=_route)
     route_seed: int | None = whole(None, low=0, optional=True)
     route_length: float = number(8.0, low=0.1, unit="m")
+    headings: str = choice("auto", HEADINGS)
+    columns: str | None = text(None, optional=True)
+    smooth: float = number(0.0, low=0, unit="m")
     eye: Eye = instance_of(Eye, attrs.Factory(Eye), "an Eye")
     seed: int = whole(0, low=0)
     renderer: str = choice("auto", BACKENDS)
@@ -111,7 +118,8 @@ class Surroundings:
         if self.route is None:
             route = generate_route(world, seed, self.route_length)
         else:
-            route = self.route if isinstance(self.route, Route) else read_route(self.route)
+            read = (self.headings, self.columns, self.smooth)
+            route = self.route if isinstance(self.route, Route) else read_route(self.route, *read)
         check_route(world, route)
         return route
 

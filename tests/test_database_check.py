@@ -203,17 +203,15 @@ def test_single_headings_off_the_path(route):
     change_bearings(route, lambda row, degrees: degrees + (100 if row in (7, 9) else 50 if row == 20 else -360))
     problem = only(route, "heading-off-path")
     assert problem.where == f"{ENTRIES}, line 9"
-    assert problem.what.startswith("2 headings are over 60 degrees off the path, the first by 99")
+    assert problem.what.startswith("2 headings are over 60 degrees off the path, the first by 9")
 
 
 @pytest.mark.parametrize(
     ("bearing", "convention"),
     [
-        (lambda row, degrees: 90 - degrees, "counter-clockwise from +x"),
-        (lambda row, degrees: degrees - 90, "clockwise from +x"),
-        (lambda row, degrees: -degrees, "counter-clockwise from +y"),
-        (lambda row, degrees: degrees + 180, "bearings backwards"),
-        (lambda row, degrees: degrees + 130, "no known convention fits"),
+        (lambda row, degrees: 90 - degrees, "degrees counter-clockwise from +x"),
+        (lambda row, degrees: -degrees, "degrees counter-clockwise from +y"),
+        (lambda row, degrees: np.radians(degrees), "bearings in radians"),
     ],
 )
 def test_headings_in_another_convention(route, bearing, convention):
@@ -221,6 +219,45 @@ def test_headings_in_another_convention(route, bearing, convention):
     problem = only(route, "heading-convention")
     assert convention in problem.what
     assert "degrees off the path (median)" in problem.what
+
+
+@pytest.mark.parametrize(
+    ("bearing", "remark"),
+    [
+        (lambda row, degrees: 0, "headings are all 0"),
+        (lambda row, degrees: 150 + row % 2, "constant 15. degrees"),
+        (
+            lambda row, degrees: degrees - 90,
+            "a constant 9. degrees to the left .* as degrees clockwise from +x they fit",
+        ),
+        (lambda row, degrees: degrees + 180, "point backwards along the path"),
+        (lambda row, degrees: degrees + 130, "a constant 13. degrees to the right of the path"),
+        (lambda row, degrees: 997 * row % 360, "do not follow the path"),
+    ],
+)
+def test_headings_that_need_not_follow_the_path_are_remarked_upon(route, caplog, bearing, remark):
+    change_bearings(route, bearing)
+    assert check_database(route) == []
+    (record,) = caplog.records
+    assert re.search(remark.replace("+", r"\+"), record.getMessage())
+
+
+def test_a_robot_that_backs_up_is_remarked_upon(route, caplog):
+    change_bearings(route, lambda row, degrees: degrees + 180 * (10 <= row < 20))
+    assert check_database(route) == []
+    assert "10 successive headings are over 60 degrees off the path" in caplog.text
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_positions_that_jitter_accuse_no_heading(route, caplog, seed):
+    lines = [line.split(", ") for line in (route / ENTRIES).read_text().splitlines()]
+    at = np.array([[float(cell) for cell in cells[:2]] for cells in lines[1:]])
+    step = np.median(np.hypot(*np.diff(at, axis=0).T))
+    moved = at + np.random.default_rng(seed).uniform(-0.3, 0.3, at.shape) * step
+    lines[1:] = [[f"{x:.3f}", f"{y:.3f}", *cells[2:]] for (x, y), cells in zip(moved, lines[1:], strict=True)]
+    (route / ENTRIES).write_text("".join(", ".join(cells) + "\n" for cells in lines))
+    assert {problem.kind for problem in check_database(route)} <= {"place-differs-from-name"}
+    assert not caplog.records
 
 
 @pytest.mark.parametrize(

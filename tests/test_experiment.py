@@ -34,6 +34,7 @@ from tussock.render.eye import Eye
 from tussock.world.errors import InputError, SettingError
 from tussock.world.files import write_world
 from tussock.world.geometry import Route
+from tussock.world.headings import HEADINGS
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
@@ -60,6 +61,9 @@ VALUES: dict[str, st.SearchStrategy] = {
     "route": st.just("route.csv"),
     "route_seed": SEEDS,
     "route_length_m": st.floats(0.1, 100),
+    "headings": st.sampled_from(HEADINGS),
+    "columns": st.sampled_from(["x,y", "x [mm],y [mm],-,heading"]),
+    "smooth_m": st.floats(0, 1),
     "spacing_m": POSITIVE,
     "every": st.integers(1, 100),
     "learning_walk_m": st.floats(0, 10),
@@ -193,6 +197,7 @@ def test_what_makes_no_sense_is_refused_where_the_experiment_is_made(settings, w
 OTHER: dict[str, Any] = {
     "world": "meadow", "world_seed": 5, "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
     "top_deg": 50.0, "bottom_deg": -20.0, "cull_back_faces": True, "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
+    "headings": "bearing", "columns": "x,y", "smooth_m": 0.1,
     "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "device": "cpu:0",
     "model": "infomax", "threads": 1, "step_m": 0.1, "offset_m": 0.1, "heading_noise_deg": 5.0, "scan_deg": 90.0, "scan_about_deg": 10.0,
     "on_lost": "reset", "waypoint_m": 0.2, "arrive_m": 0.1, "lost_m": 0.6, "patience_m": 2.0, "max_steps": 9,

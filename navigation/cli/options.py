@@ -104,11 +104,20 @@ class RouteOptions(ViewOptions):
     """What world is seen, through what eye, and a route through it."""
 
     route: Path | None = None
-    """A route file (.csv or AntWorld .bin); without it one is generated."""
+    """A route file (.csv, .txt, .mat, .npy or AntWorld .bin); without it one is generated."""
     route_seed: int | None = None
     """Seed of a generated route. Default: --seed."""
     route_length_m: float = default(Surroundings, "route_length")
     """Length of a generated route."""
+    headings: Annotated[str, tyro.conf.arg(metavar="auto|ccw|bearing|radians|path|as-is")] = default(
+        Surroundings, "headings"
+    )
+    """How the headings of the route's file are meant. auto reads and checks them, path takes the direction to the next point, as-is leaves
+    out the check. Also radians-bearing, clockwise, ccw-from-north, backwards, bearing-backwards."""
+    columns: Annotated[str | None, tyro.conf.arg(metavar="x,y,heading")] = None
+    """Names of the columns of the route's file in their order, as in 'x [mm],y [mm],-,heading'; - skips one. Default: those of the file."""
+    smooth_m: float = default(Surroundings, "smooth")
+    """Average the positions of the route's file along the path, with a Gaussian window of this standard deviation; 0 is none."""
 
 
 @dataclass

@@ -1,5 +1,6 @@
 """What is wrong with an image database: files, names, positions, headings, and the axes of a grid."""
 
+import logging
 import os
 import re
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from jaxtyping import Float
 
 from tussock.world.errors import FileError
 from tussock.world.geometry import wrap_angle
+from tussock.world.headings import Diagnosis, diagnose
 
 from .database import KINDS, Database, check_video_name, guessed_metadata, is_outside
 from .entries import ENTRIES, FRAME, is_grid, read_entries
@@ -20,9 +22,12 @@ from .lens_metadata import stated_unwrapping
 from .metadata import METADATA, read_metadata
 from .pictures import SUFFIXES, check_content
 
+logger = logging.getLogger(__name__)
+
 POSITION_NAME = re.compile(r"_([+-]\d+)_([+-]\d+)_([+-]\d+)\.\w+$")  # mm
-MAX_OFF_PATH = np.radians(60)  # a heading farther than this from the segments on both sides is wrong ..
-MAX_MEDIAN = np.radians(20)  # .. and if half of them are farther than this, all of them follow another convention
+MAX_OFF_PATH = np.radians(60)  # a heading farther than this from the path on both sides is wrong ..
+MAX_MEDIAN = np.radians(20)  # .. unless half of them are farther than this: then the positions jitter
+REACHES = (1, 2, 4)  # rows over which the direction of the path is taken
 
 
 def check_database(folder: str | os.PathLike) -> list[Problem]:
@@ -139,53 +144,69 @@ def check_names(inspection: Inspection) -> Iterator[Problem]:
 
 
 def check_headings(inspection: Inspection) -> Iterator[Problem]:
-    """Headings of a route that do not lead along it."""
-    poses = inspection.database.poses
+    """Headings of a route that follow another convention, or single ones that do not lead along it.
+
+    Headings that have nothing to do with the path, such as those of a drone that faces north all the time, are logged as a remark.
+    """
     if inspection.database.kind != "route":
         return
-    if error := heading_convention_error(poses):
-        yield Problem("heading-convention", ENTRIES, error)
+    poses = inspection.database.poses
+    diagnosis = diagnose(poses, "bearing")
+    if diagnosis.kind == "convention":
+        yield Problem("heading-convention", ENTRIES, f"{diagnosis}; {diagnosis.flags}")
+    elif str(diagnosis):
+        logger.warning("%s: %s", inspection.database.folder, diagnosis)
+    else:
+        yield from _single_headings(inspection, _off_path(poses))
+
+
+def _single_headings(inspection: Inspection, off: Float[np.ndarray, " n"]) -> Iterator[Problem]:
+    """Headings that are wrong among right ones. Several in succession are a manoeuvre, such as a robot that backs up: a remark."""
+    if np.nanmedian(np.r_[off, np.nan, 0]) > MAX_MEDIAN:
         return
-    off = _off_path(poses, poses[:, 2])
-    wrong = np.flatnonzero(off > MAX_OFF_PATH).tolist()  # False for nan
-    if wrong:
-        degrees = np.degrees(off[wrong[0]])
-        what = f"{len(wrong)} headings are over 60 degrees off the path, the first by {degrees:.0f}"
-        yield Problem("heading-off-path", inspection.line(wrong[0]), what)
+    wrong = off > MAX_OFF_PATH  # False for nan
+    alone = wrong & ~(np.r_[False, wrong[:-1]] & np.r_[wrong[1:], False])
+    alone &= ~(np.r_[False, (wrong & ~alone)[:-1]] | np.r_[(wrong & ~alone)[1:], False])
+    rows, others = np.flatnonzero(alone).tolist(), np.flatnonzero(wrong & ~alone).tolist()
+    if rows:
+        degrees = np.degrees(off[rows[0]])
+        what = f"{len(rows)} headings are over 60 degrees off the path, the first by {degrees:.0f}"
+        yield Problem("heading-off-path", inspection.line(rows[0]), what)
+    if others:
+        where = f"{inspection.database.folder}, {inspection.line(others[0])}"
+        logger.warning(
+            "%s: %d successive headings are over 60 degrees off the path; does it turn or back up?", where, len(others)
+        )
 
 
 def heading_convention_error(poses: Float[np.ndarray, "n 3"]) -> str | None:
-    """A sentence if most headings of a route do not lead along it, with the convention in which they would.
+    """A sentence if the headings of a database's route follow its path in another convention than bearings, with that convention.
 
-    None if they do, or if that is undetermined.
+    None if they follow the path, if they have nothing to do with it, and if that is undetermined.
     """
-    off = _off_path(poses, poses[:, 2])
-    known = np.isfinite(off)
-    if not known.any() or (median := np.median(off[known])) <= MAX_MEDIAN:
-        return None
-    return f"headings are {np.degrees(median):.0f} degrees off the path (median){_intended_convention(poses)}"
+    diagnosis: Diagnosis = diagnose(poses, "bearing")
+    return str(diagnosis) if diagnosis.kind == "convention" else None
 
 
-def _off_path(poses: Float[np.ndarray, "n 3"], heading: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Angle between each heading and the nearer of the segments before and after it (rad), nan where there is none."""
-    step = np.diff(poses[:, :2], axis=0)
-    along = np.where(np.hypot(*step.T) > 1e-6, np.arctan2(step[:, 1], step[:, 0]), np.nan)
-    before, after = np.r_[np.nan, along], np.r_[along, np.nan]
-    return np.fmin(np.abs(wrap_angle(heading - before)), np.abs(wrap_angle(heading - after)))
+def _off_path(poses: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+    """Angle between each heading and the path (rad), nan where there is none.
 
-
-def _intended_convention(poses: Float[np.ndarray, "n 3"]) -> str:
-    """In which convention the headings would lead along the path, for the end of a sentence."""
-    bearing = np.pi / 2 - poses[:, 2]
-    others = {
-        "counter-clockwise from +x": bearing,
-        "clockwise from +x": -bearing,
-        "counter-clockwise from +y": np.pi / 2 + bearing,
-        "bearings backwards": poses[:, 2] + np.pi,
-    }
-    off = {name: float(np.nanmedian(_off_path(poses, heading))) for name, heading in others.items()}
-    best = min(off, key=lambda name: off[name])
-    return f"; as {best} they would fit" if off[best] < MAX_MEDIAN else "; no known convention fits"
+    The path of a row has the directions from the segment before it to that after it, and those of longer chords around it: the
+    nearest counts, so that neither turns nor jitter of the positions count.
+    """
+    off = np.full(len(poses), np.nan)
+    for reach in REACHES:
+        x, y = poses[:, 0], poses[:, 1]
+        chord = np.column_stack([x[reach:] - x[:-reach], y[reach:] - y[:-reach]])
+        along = np.where(np.hypot(*chord.T) > 1e-6, np.arctan2(chord[:, 1], chord[:, 0]), np.nan)
+        none = np.full(min(reach, len(poses)), np.nan)
+        before, after = np.r_[none, along], np.r_[along, none]
+        turn, from_before, from_after = (
+            wrap_angle(each) for each in (after - before, poses[:, 2] - before, after - poses[:, 2])
+        )
+        between = np.abs(from_before) + np.abs(from_after) <= np.abs(turn) + 1e-6
+        off = np.fmin(off, np.where(between, 0.0, np.fmin(np.abs(from_before), np.abs(from_after))))
+    return off
 
 
 def check_extent(inspection: Inspection) -> Iterator[Problem]:

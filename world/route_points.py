@@ -1,0 +1,193 @@
+"""The points of a route in a file of any kind that is known, before it is decided what their headings mean."""
+
+import logging
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from .contents import WORLD, described
+from .errors import FileError
+from .route_arrays import read_mat, read_npy, read_npz
+from .route_columns import Column, chosen_column, find_columns, parse_columns
+from .route_tables import columns_of, decode, read_table
+
+logger = logging.getLogger(__name__)
+
+MAX_GAPS = 0.05  # of the rows may lack a number
+TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log", "")
+
+
+@dataclass
+class Points:
+    """The points of a route as a file has them.
+
+    Attributes:
+        xy: Positions (m).
+        heading: Its numbers, as if they were counter-clockwise from +x in the unit of the file (rad), or None.
+        bearing: Whether the file states that they are compass bearings.
+        radians: Whether the file states that they are radians.
+        unstated: Names of the columns whose unit is not stated: they were taken to be metres.
+        planes: Whether the file is an AntWorld .bin.
+        gaps: Lines without a position, which are left out.
+    """
+
+    xy: Float[np.ndarray, "n 2"]
+    heading: Float[np.ndarray, " n"] | None
+    bearing: bool = False
+    radians: bool = False
+    unstated: str = ""
+    planes: bool = False
+    gaps: list[int] = field(default_factory=list)
+
+
+def read_points(path: Path, columns: str | None) -> Points:
+    """The points in a file; its kind is known by its content, then by its suffix.
+
+    Args:
+        path: The file.
+        columns: Names of its columns, as `read_route` takes them.
+
+    Raises:
+        FileError: For a file that is not a route.
+        SettingError: For invalid names of columns.
+    """
+    data, suffix = path.read_bytes(), path.suffix.lower()
+    if not data:
+        raise FileError("line 1: it is empty; a route needs x_m,y_m,heading_deg")
+    if data.startswith(b"\x93NUMPY"):
+        return _of_arrays(read_npy(data), columns)
+    if suffix == ".npz" and data.startswith(b"PK"):
+        return _of_arrays(read_npz(data), columns)
+    if data.startswith(b"MATLAB") or (suffix == ".mat" and described(data) is None):
+        return _of_arrays(read_mat(data), columns)
+    if suffix == ".bin":
+        return _of_planes(data)
+    if sentence := described(data):
+        raise FileError(f"it is not a route: {sentence}")
+    if suffix not in TEXT_SUFFIXES and not suffix[1:].isdigit():
+        raise FileError(f"unknown kind of route {suffix!r}; give .csv, .txt, .mat, .npy or AntWorld .bin")
+    return _of_text(decode(data), columns)
+
+
+def _of_text(text: str, columns: str | None) -> Points:
+    """The points in a table; rows with gaps are left out while they are few."""
+    table = read_table(text, None if columns is None else parse_columns(columns))
+    found = columns_of(table)
+    values = np.array([table.column(index, column) for index, column in found.values()])
+    if "heading" in found and values.size and np.isnan(values[2]).all():
+        logger.warning("the column %r is empty: each point faces the next one", found.pop("heading")[1].name)
+        values = values[:2]
+    lost: np.ndarray = np.asarray(np.isnan(values).any(axis=0))
+    if lost.sum() > MAX_GAPS * len(lost):
+        row = int(lost.argmax())
+        index, column = list(found.values())[int(np.isnan(values[:, row]).argmax())]
+        more = f" ({lost.sum()} of {len(lost)} rows lack a number; complete or remove them)" if lost.sum() > 1 else ""
+        raise FileError(f"line {table.lines[row]}: {table.refused(row, index, column)}{more}")
+    points = _of_columns({axis: column for axis, (_, column) in found.items()}, values[:, ~lost])
+    points.gaps = [table.lines[row] for row in np.flatnonzero(lost)]
+    return points
+
+
+def _of_columns(columns: dict[str, Column], values: Float[np.ndarray, "axes n"]) -> Points:
+    """The points of which columns have the values."""
+    scaled = [column.factor * each for column, each in zip(columns.values(), values, strict=True)]
+    heading = columns.get("heading")
+    return Points(
+        np.column_stack(scaled[:2]),
+        scaled[2] if heading else None,
+        bearing=bool(heading and heading.bearing),
+        radians=bool(heading and heading.unit == "radians"),
+        unstated=" and ".join(repr(columns[axis].name) for axis in "xy" if not columns[axis].stated),
+    )
+
+
+def _of_planes(data: bytes) -> Points:
+    """The points in an AntWorld .bin: x (cm), y (cm) and heading (degrees), one after the other."""
+    if sentence := described(data) if len(data) % 24 else None:
+        raise FileError(f"it is not a route: {sentence}")
+    if len(data) % 24:
+        raise FileError(f"it has {len(data)} bytes; an AntWorld route has a multiple of 24 (is it truncated?)")
+    planes = np.frombuffer(data, dtype="<f8")
+    if is_world(planes):
+        raise FileError(f"it is not a route: {WORLD.format('AntWorld .bin')}")
+    x, y, heading = planes.reshape(3, -1)
+    with np.errstate(all="ignore"):  # any bytes are numbers
+        return Points(np.column_stack([x, y]) / 100, np.radians(heading), planes=True)
+
+
+def is_world(planes: Float[np.ndarray, " n"]) -> bool:
+    """Whether the numbers of an AntWorld .bin are those of a world: small triangles, with colours from 0 to 1 that differ."""
+    if len(planes) % 12:
+        return False
+    columns = planes.reshape(12, -1)
+    if not np.isfinite(columns).all() or columns[9:].min() < 0 or columns[9:].max() > 1 or not np.ptp(columns[9:]):
+        return False
+    with np.errstate(all="ignore"):
+        x, y, z = columns[:9].reshape(3, 3, -1)
+        size = np.median([np.ptp(each, axis=0) for each in (x, y)], axis=1)  # of most triangles
+        extent = np.array([np.ptp(x), np.ptp(y)])
+        return bool((size <= 0.2 * extent.max()).all() and np.ptp(z) <= 2 * extent.max())
+
+
+def _of_arrays(arrays: dict[str, np.ndarray], columns: str | None) -> Points:
+    """The points in arrays with names: vectors x, y and heading, or one matrix with a point in each row."""
+    array, _, names = (columns or "").rpartition(":")
+    chosen = [name.strip() for name in names.split(",")]
+    if names and not array and set(chosen) <= arrays.keys():
+        if len(chosen) in (2, 3):
+            axes = dict(zip(("x", "y", "heading"), chosen, strict=False))
+            return _of_columns(
+                {axis: chosen_column(name, axis) for axis, name in axes.items()}, _stacked(arrays, chosen)
+            )
+        array, names = chosen[0], ""
+    vectors = [name for name, each in arrays.items() if each.ndim == 1]
+    if not array and not names:
+        found = find_columns([name.rpartition(".")[2] for name in vectors])
+        if {"x", "y"} <= found.keys():
+            used = [vectors[index] for index, _ in found.values()]
+            return _of_columns({axis: column for axis, (_, column) in found.items()}, _stacked(arrays, used))
+    name, matrix = _matrix(arrays, array, any_width=bool(names))
+    header = parse_columns(names) if names else ["x", "y", "heading"][: matrix.shape[1]]
+    if len(header) > matrix.shape[1]:
+        raise FileError(f"{name} has {matrix.shape[1]} columns, and --columns names {len(header)}")
+    found = find_columns(header)
+    rows = matrix[:, [index for index, _ in found.values()]].T
+    return _of_columns({axis: column for axis, (_, column) in found.items()}, _complete(rows, name))
+
+
+def _matrix(arrays: dict[str, np.ndarray], name: str, any_width: bool) -> tuple[str, np.ndarray]:
+    """The matrix of this name, or the only one, with a point in each row. any_width: not only of 2 or 3 columns."""
+    matrices = {key: each for key, each in arrays.items() if each.ndim == 2 and name in ("", key)}
+    if not any_width:
+        upright = {key: each if each.shape[1] in (2, 3) else each.T for key, each in matrices.items()}
+        matrices = {key: each for key, each in upright.items() if each.shape[1] in (2, 3)}
+    if len(matrices) != 1:
+        listed = ", ".join(f"{key} ({' x '.join(map(str, each.shape))})" for key, each in list(arrays.items())[:12])
+        raise FileError(
+            f"it holds {listed or 'no arrays of numbers'}; choose the matrix of points, or x, y and heading: --columns NAME, "
+            "--columns X,Y,HEADING or --columns NAME:x,y,heading"
+        )
+    return next(iter(matrices.items()))
+
+
+def _stacked(arrays: dict[str, np.ndarray], names: list[str]) -> Float[np.ndarray, "axes n"]:
+    """Vectors of one length. Raises FileError where they differ."""
+    vectors = [arrays[name].ravel() for name in names]
+    if len({len(each) for each in vectors}) > 1:
+        sizes = ", ".join(f"{name} {len(each)}" for name, each in zip(names, vectors, strict=True))
+        raise FileError(f"its arrays have different lengths ({sizes}); choose others with --columns")
+    return _complete(np.array(vectors), " and ".join(names))
+
+
+def _complete(values: Float[np.ndarray, "axes n"], name: str) -> Float[np.ndarray, "axes n"]:
+    """The values without columns that hold nan, while they are few. Raises FileError."""
+    lost: np.ndarray = np.logical_not(np.isfinite(values).all(axis=0))
+    if lost.sum() > MAX_GAPS * len(lost):
+        raise FileError(
+            f"{name}: {lost.sum()} of {len(lost)} points are not finite, the first is number {lost.argmax() + 1}; complete them"
+        )
+    if lost.any():
+        logger.warning("%s: %d of %d points are not finite, and left out", name, lost.sum(), len(lost))
+    return values[:, ~lost]
