@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from tussock.world.errors import FileError
 from tussock.world.geometry import wrap_angle
-from tussock.world.headings import Diagnosis, diagnose
+from tussock.world.headings import Diagnosis, convert, diagnose
 
 from .database import KINDS, Database, check_video_name, guessed_metadata, is_outside
 from .entries import ENTRIES, FRAME, is_grid, read_entries
@@ -30,11 +30,16 @@ MAX_MEDIAN = np.radians(20)  # .. unless half of them are farther than this: the
 REACHES = (1, 2, 4)  # rows over which the direction of the path is taken
 
 
-def check_database(folder: str | os.PathLike) -> list[Problem]:
+def check_database(folder: str | os.PathLike, headings: str = "auto") -> list[Problem]:
     """All that is wrong with the database in a folder. What is only assumed about it is logged.
+
+    Args:
+        folder: The folder.
+        headings: How its headings are meant, as `read_database` takes it; as-is leaves out their check.
 
     Raises:
         FileError: The folder has no entries file.
+        SettingError: For an unknown convention of headings.
     """
     folder = Path(folder)
     if not (folder / ENTRIES).is_file():
@@ -55,14 +60,16 @@ def check_database(folder: str | os.PathLike) -> list[Problem]:
         problems.append(Problem("damaged-metadata", METADATA, f"the type is {kind!r}, not {' or '.join(KINDS)}"))
     if kind not in KINDS:
         kind = "grid" if is_grid(entries.columns) else "route"
-    database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
+    poses = convert(entries.poses, headings, "bearing")
+    database = Database(folder=folder, kind=kind, metadata=metadata, **(vars(entries) | {"poses": poses}))
     try:
         if database.frames is not None:
             check_video_name(folder, metadata)
         inspection = inspected(database)
     except FileError as error:  # about the video
         return [*problems, Problem("unreadable-video", METADATA, str(error))]
-    return problems + [problem for check in CHECKS for problem in check(inspection)]
+    checks = [check for check in CHECKS if check is not check_headings or headings != "as-is"]
+    return problems + [problem for check in checks for problem in check(inspection)]
 
 
 def check_files(inspection: Inspection) -> Iterator[Problem]:

@@ -18,6 +18,7 @@ from jaxtyping import Float, UInt8
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
+from tussock.world.headings import convert
 
 from .entries import ENTRIES, Columns, is_grid, read_entries, write_entries
 from .lens_metadata import needs_unwrapping, stated_unwrapping
@@ -159,11 +160,16 @@ class Database:
         return read_database(folder)
 
 
-def read_database(folder: str | os.PathLike) -> Database:
+def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database:
     """Open the image database in a folder. Without a metadata file, its kind is guessed from its columns, and that is logged.
+
+    Args:
+        folder: The folder.
+        headings: How its headings are meant, a name in `tussock.world.headings.HEADINGS`. auto: as bearings, which the format has.
 
     Raises:
         FileError: Its entries are missing, its files are damaged, list no images, or name files outside the folder.
+        SettingError: For an unknown convention of headings.
     """
     folder = Path(folder)
     entries = read_entries(folder / ENTRIES)
@@ -180,7 +186,8 @@ def read_database(folder: str | os.PathLike) -> Database:
         raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
     if entries.frames is not None:
         check_video_name(folder, metadata)
-    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
+    poses = convert(entries.poses, headings, "bearing")
+    return Database(folder=folder, kind=kind, metadata=metadata, **(vars(entries) | {"poses": poses}))
 
 
 def check_video_name(folder: Path, metadata: dict[str, Any]) -> None:
