@@ -359,3 +359,15 @@ def test_the_sussex_grid_and_routes_are_correct(tmp_path, sussex):
         for name in ("ant1_route1", "ant4_route1"):
             write_database(tmp_path / name, renderer, read_route(sussex / f"{name}.bin").resampled(0.05).poses)
             assert check_database(tmp_path / name) == []
+
+
+def test_a_convention_that_was_found_is_read_with_its_flag(route):
+    text = (route / ENTRIES).read_text().splitlines()
+    rows = [line.split(", ") for line in text[1:]]
+    changed = [", ".join([*row[:3], str(90 - float(row[3])), *row[4:]]) for row in rows]  # counter-clockwise from +x
+    (route / ENTRIES).write_text("\n".join([text[0], *changed]) + "\n")
+    assert "--headings ccw" in only(route, "heading-convention").what
+    assert check_database(route, "ccw") == check_database(route, "as-is") == []
+    assert np.allclose(read_database(route, "ccw").poses, curve(), atol=1e-9)
+    with pytest.raises(InputError, match="headings are 'north'"):
+        read_database(route, "north")

@@ -4,6 +4,7 @@ import logging
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +61,8 @@ def check_database(folder: str | os.PathLike, headings: str = "auto") -> list[Pr
         problems.append(Problem("damaged-metadata", METADATA, f"the type is {kind!r}, not {' or '.join(KINDS)}"))
     if kind not in KINDS:
         kind = "grid" if is_grid(entries.columns) else "route"
-    poses = convert(entries.poses, headings, "bearing")
-    database = Database(folder=folder, kind=kind, metadata=metadata, **(vars(entries) | {"poses": poses}))
+    database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
+    database = replace(database, poses=convert(entries.poses, headings, "bearing"))
     try:
         if database.frames is not None:
             check_video_name(folder, metadata)

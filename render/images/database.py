@@ -8,7 +8,7 @@ import logging
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -186,8 +186,8 @@ def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database
         raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
     if entries.frames is not None:
         check_video_name(folder, metadata)
-    poses = convert(entries.poses, headings, "bearing")
-    return Database(folder=folder, kind=kind, metadata=metadata, **(vars(entries) | {"poses": poses}))
+    database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
+    return replace(database, poses=convert(entries.poses, headings, "bearing"))
 
 
 def check_video_name(folder: Path, metadata: dict[str, Any]) -> None:
