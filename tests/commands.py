@@ -36,6 +36,8 @@ KEYS = {
     "database grid": _DATABASE,
     "database route": _DATABASE,
     "database check": {"database", "type", "images", "problems", "ok"},
+    "database import": {"database", "type", "images", "written", "size", "mask"},
+    "unwrap": {"out", "panoramas", "lens", "size"},  # of a ring, centre, inner and outer as well
 }  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Image databases: whatever is in their files, they are read, copied and completed, or refused, and nothing beside them is touched."""
 
+import logging
 import os
 import shutil
 import struct
@@ -13,10 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tussock.render import Eye, open_renderer
+from tussock.render.images.camera import Camera
 from tussock.render.images.check import check_database
-from tussock.render.images.database import read_database, read_image
+from tussock.render.images.database import read_database
 from tussock.render.images.entries import ENTRIES
+from tussock.render.images.importing import import_database
 from tussock.render.images.metadata import METADATA, read_metadata, write_metadata
+from tussock.render.images.pictures import read_image
+from tussock.render.images.ring_search import find_ring
 from tussock.render.images.writing import Grid, write_database
 from tussock.world.geometry import Bounds
 from tussock.world.scene import World
@@ -47,6 +52,7 @@ JSONS = [
     b'{"metadata": {"type": "route", "list": [1, [2, {"a": "b"}]], "n": null, "x": 1e5}}',
     b'<?xml version="1.0"?><opencv_storage><metadata><type>route</type></metadata></opencv_storage>',
 ]
+logging.disable()  # what is assumed about damaged files
 SECRET = FOLDER / "secret.png"  # beside the databases
 IMAGE = cv2.imencode(".png", np.arange(24, dtype=np.uint8).reshape(2, 4, 3))[1].tobytes()
 SECRET.write_bytes(IMAGE)
@@ -169,6 +175,94 @@ def metadata_comes_back(kept):
         assert repr(read_metadata(path)) == repr(kept)
     else:
         assert not path.exists()
+
+
+def video(width: int, height: int, count: int) -> bytes:
+    """An AVI with some grey frames."""
+    path = FOLDER / "made.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 15, (width, height))
+    for i in range(count):
+        writer.write(np.full((height, width, 3), 40 * i, np.uint8))
+    writer.release()
+    return path.read_bytes()
+
+
+FILM = video(16, 8, 4)
+FRAMES = b"Frame, X [mm], Y [mm], Heading [degrees]\n0, 0, 0, 90\n2, 10, 0, 90\n3, 20, 0, 90\n"
+FILM_YAML = b'%YAML:1.0\n---\nmetadata:\n   type: route\n   videoFile: "film.avi"\n'
+
+
+@holds(80)
+@given(
+    damaged([FRAMES]) | st.just(FRAMES),
+    damaged([FILM_YAML]) | st.just(FILM_YAML),
+    damaged([FILM]) | st.binary(max_size=99),
+)
+def videos(sheet, yaml, film):
+    folder = fresh("film", sheet, yaml)
+    (folder / "film.avi").write_bytes(film)
+    read_and_copied(folder)
+
+
+numbers_or_more = VALUES | st.floats() | st.integers(-(10**9), 10**9) | st.lists(st.floats(), max_size=3)
+unwrappers = st.fixed_dictionaries(
+    {},
+    optional=dict.fromkeys(
+        ("centre", "center", "inner", "outer", "offsetDegrees", "flip", "size", "mirrored"), numbers_or_more
+    ),
+)
+
+
+@holds(120)
+@given(unwrappers, numbers_or_more)
+def raw_pictures(unwrapper, needs):
+    metadata = {"type": "route", "unwrapper": {"centre": [0.5, 0.5], "inner": 0.1, "outer": 0.45} | unwrapper}
+    folder = fresh("raw")
+    (folder / METADATA).unlink()
+    if answer(folder, lambda: write_metadata(folder / METADATA, metadata | {"needsUnwrapping": needs}) or True):
+        read_and_copied(folder)
+
+
+TRACK = b"""x_m,y_m,heading_deg,filename,frame,time_s
+0,0,0,image_00000.png,0,0.5
+1,0,0,image_00001.png,2,0.6
+2,0.1,5,sub/image.png,3,0.7
+"""
+CALIBRATION = b"%YAML:1.0\n---\nK: [ 9., 0., 2., 0., 9., 1., 0., 0., 1. ]\nD: [ 0.1, 0., 0., 0. ]\nxi: 1.0\n"
+
+
+@holds(80)
+@given(
+    damaged([TRACK]) | st.binary(max_size=99) | st.just(TRACK),
+    damaged([CALIBRATION]) | st.just(CALIBRATION),
+    st.sampled_from(["auto", "fisheye", "omnidirectional", "panorama", "equirectangular", "ring"]),
+    st.booleans(),
+)
+def imports(table, calibration, lens, from_video):
+    folder, out = fresh("imported"), FOLDER / "out"
+    shutil.rmtree(out, ignore_errors=True)
+    (folder / "film.avi").write_bytes(FILM)
+    (FOLDER / "t.csv").write_bytes(table)
+    (FOLDER / "c.yaml").write_bytes(calibration)
+    source = folder / "film.avi" if from_video else folder
+    others = (out, FOLDER / "copy")
+    before = beside(*others)
+    calibrated = lens in ("fisheye", "omnidirectional")
+    camera = answer(
+        None, lambda: Camera(lens=lens, width=8, height=2, calibration=FOLDER / "c.yaml" if calibrated else None)
+    )
+    if answer(None, lambda: import_database(out, source, FOLDER / "t.csv", camera)):
+        read_and_copied(out)
+    assert beside(*others) == before
+
+
+@holds(80)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.integers(1, 40), st.sampled_from([0, 3, 100]))
+def rings(seed, width, height, noise):
+    rng = np.random.default_rng(seed)
+    picture = np.clip(rng.integers(0, 256, 3) + rng.normal(0, noise, (height, width, 3)), 0, 255).astype(np.uint8)
+    found = answer(None, lambda: find_ring([picture]))
+    assert found is None or (np.isfinite(found.centre).all() and 0 <= found.inner < found.outer)
 
 
 RENDERER = open_renderer(World.generate("tiny", 0), Eye(width=4, height=2, samples=1), "cpu")

@@ -1,6 +1,7 @@
 """Image databases: what is written is read back to the last bit, also after interruptions; published databases can be read."""
 
 import json
+import logging
 import os
 import random
 import re
@@ -20,9 +21,10 @@ from tussock.navigation.cli.databases import DatabaseGridCommand
 from tussock.navigation.cli.main import main
 from tussock.render.eye import Eye
 from tussock.render.images.check import check_database
-from tussock.render.images.database import Database, read_database, read_image
+from tussock.render.images.database import Database, read_database
 from tussock.render.images.entries import ENTRIES, stored_poses
 from tussock.render.images.metadata import METADATA, read_metadata, write_metadata
+from tussock.render.images.pictures import read_image
 from tussock.render.images.writing import Grid, write_database
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError, SettingError
@@ -362,8 +364,13 @@ def test_grey_images_have_three_equal_channels_and_sizes_must_agree(tmp_path):
         read_database(folder).views()
 
 
+FRAMES = re.sub(r"image_0000(\d).png", r"\1", PUBLISHED).replace("Filename", "Frame")
+
 BAD = {
-    "a video": (PUBLISHED.replace("Filename", "Frame"), YAML, "frames of a video"),
+    "no frame numbers": (PUBLISHED.replace("Filename", "Frame"), YAML, r"line 2: Frame is 'image_00000\.png'"),
+    "no video": (FRAMES, YAML, "names no videoFile"),
+    "a video above": (FRAMES, YAML + '   videoFile: "../d.png"\n', r"'\.\./d\.png' is not in the folder"),
+    "a frame before the first": (FRAMES.replace("180, 2", "180, -2"), YAML, "line 4: Frame is not a whole number"),
     "no X": (PUBLISHED.replace("X [mm]", "X [m]"), YAML, r"line 1: there is no column 'X \[mm\]'"),
     "no names": (PUBLISHED.replace("Filename", "File"), YAML, "line 1: there is no column 'Filename'"),
     "two X": (PUBLISHED.replace("Y [mm]", "X [mm]"), YAML, r"line 1: the column 'X \[mm\]' .*twice"),
@@ -398,11 +405,10 @@ def test_damaged_databases_are_refused_in_one_line(tmp_path, what):
     assert str(folder) in str(refusal.value)
 
 
-@pytest.mark.parametrize("name", [ENTRIES, METADATA])
-def test_missing_files_are_named(tmp_path, name):
+def test_missing_entries_are_named(tmp_path):
     folder = by_hand(tmp_path / "d", PUBLISHED)
-    (folder / name).unlink()
-    with pytest.raises(InputError, match=f"there is no .*{name}"):
+    (folder / ENTRIES).unlink()
+    with pytest.raises(InputError, match=f"there is no .*{ENTRIES}"):
         read_database(folder)
 
 
@@ -432,6 +438,196 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, entries, yaml):
         assert "\n" not in str(error)  # noqa: PT017
     else:
         assert len(database) == len(database.poses) == len(database.z)
+
+
+# What is understood of published databases.
+
+
+def test_positions_far_from_the_origin_are_kept(tmp_path):
+    entries = "".join(f"704497000.25, {5638660000 + 50 * i}.0, 56600, 0, image_{i:05d}.png\n" for i in range(3))
+    database = read_database(by_hand(tmp_path / "d", PUBLISHED.splitlines(keepends=True)[0] + entries))
+    assert database.poses[:, :2].tolist() == [[704497.00025, 5638660 + i / 20] for i in range(3)]
+    assert database.z.tolist() == [56.6] * 3
+    assert check_database(tmp_path / "d") == []
+
+
+def with_alpha(folder: Path, *alphas: int | None) -> Path:
+    """A database whose images have these constants as alpha, but in one pixel at a corner 255."""
+    by_hand(folder, PUBLISHED)
+    for i, alpha in enumerate(alphas):
+        if alpha is not None:
+            image = np.full((4, 8, 4), [10 * i, 50, 200, alpha], dtype=np.uint8)
+            image[0, 0, 3] = 255
+            cv2.imwrite(str(folder / f"image_{i:05d}.png"), image)
+    return folder
+
+
+def test_alpha_that_is_opaque_everywhere_is_dropped_and_that_is_logged_once(tmp_path, caplog):
+    folder = with_alpha(tmp_path / "d", 255, 255, 255)
+    database = read_database(folder)
+    with caplog.at_level(logging.INFO, "tussock"):
+        assert database.views([1]).shape == (1, 4, 8, 3)
+        assert np.array_equal(database.views(), read_database(by_hand(tmp_path / "rgb", PUBLISHED)).views())
+    assert [
+        record.getMessage() for record in caplog.records if "alpha is 255" in record.getMessage()
+    ] == caplog.messages
+    assert len(caplog.messages) == 1
+    caplog.clear()
+    assert check_database(folder) == []
+    assert "alpha is 255" in caplog.text
+
+
+def test_alpha_is_kept_where_one_image_of_the_database_has_any(tmp_path, caplog):
+    database = read_database(with_alpha(tmp_path / "d", 255, 255, 254))
+    assert database.views([0]).shape == (1, 4, 8, 4)  # although all of this one is opaque
+    assert not caplog.records
+    many = PUBLISHED.splitlines(keepends=True)[0] + "".join(f"{i}, 0, 10, 90, image_{i:05d}.png\n" for i in range(70))
+    folder = by_hand(tmp_path / "many", many, images=0)
+    for i in range(70):
+        cv2.imwrite(str(folder / f"image_{i:05d}.png"), np.full((4, 8, 4), 255 if i != 5 else 9, dtype=np.uint8))
+    assert read_database(folder).views([0]).shape == (1, 4, 8, 4)
+
+
+def test_opaque_alpha_and_none_are_mixed(tmp_path):
+    assert read_database(with_alpha(tmp_path / "d", 255, None, 255)).views().shape == (3, 4, 8, 3)
+    with pytest.raises(InputError, match=r"image_00001\.png is 8 x 4 x 3"):
+        read_database(with_alpha(tmp_path / "e", 9, None, 255)).views()
+
+
+def video_database(folder: Path, frames=(4, 0, 2), total: int = 6) -> Path:
+    """Rows that are frames of a video, frame n of which is grey 40 n + 10."""
+    by_hand(
+        folder,
+        PUBLISHED.replace("Filename", "Frame"),
+        YAML.replace("[ 8, 4 ]", "[ 16, 8 ]") + '   videoFile: "drive.avi"\n',
+        images=0,
+    )
+    text = (folder / ENTRIES).read_text()
+    for i, frame in enumerate(frames):
+        text = text.replace(f"image_{i:05d}.png", str(frame))
+    (folder / ENTRIES).write_text(text)
+    writer = cv2.VideoWriter(str(folder / "drive.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 15, (16, 8))
+    for frame in range(total):
+        writer.write(np.full((8, 16, 3), 40 * frame + 10, dtype=np.uint8))
+    writer.release()
+    return folder
+
+
+def test_the_rows_of_a_video_database_are_its_frames(tmp_path):
+    database = read_database(video_database(tmp_path / "d"))
+    assert (len(database), database.frames) == (3, (4, 0, 2))
+    assert np.rint((database.views().mean(axis=(1, 2, 3)) - 10) / 40).tolist() == [4, 0, 2]
+    assert np.rint((database.views([2, 2]).mean(axis=(1, 2, 3)) - 10) / 40).tolist() == [2, 2]
+    assert len(database.views([])) == 0
+    assert np.array_equal(database.write(tmp_path / "copy").views(), database.views())
+
+
+def test_frames_that_a_video_does_not_have_are_named(tmp_path, capfd):
+    folder = video_database(tmp_path / "d", (0, 6, 10**8))
+    with pytest.raises(InputError, match="6 frames that can be read; there is no frame 6"):
+        read_database(folder).views()
+    assert [(each.kind, each.where) for each in check_database(folder)] == [
+        ("missing-frame", f"{ENTRIES}, line 3"), ("missing-frame", f"{ENTRIES}, line 4")
+    ]  # fmt: skip
+    whole = (folder / "drive.avi").read_bytes()
+    for data in (
+        b"",
+        b"text",
+        whole[:300],
+        b"RIFF" + bytes(300),
+        b"#EXTM3U\n/etc/hosts\n",
+        b"ffconcat version 1.0\nfile /etc/hosts\n",
+    ):
+        (folder / "drive.avi").write_bytes(data)
+        with pytest.raises(InputError, match=r"drive\.avi"):
+            read_database(folder).views([0])
+        (problem,) = check_database(folder)[:1]
+        assert problem.kind in ("unreadable-video", "missing-frame")
+    (folder / "drive.avi").unlink()
+    with pytest.raises(InputError, match=r"there is no .*drive\.avi"):
+        read_database(folder).views([0])
+    assert capfd.readouterr().err == ""
+
+
+RING = """   unwrapper:
+      centre: [ 0.5, 0.5 ]
+      inner: 0.1
+      outer: 0.45
+      offsetDegrees: 0.
+      flip: 0
+"""
+
+
+def ring_database(folder: Path, yaml: str = RING, needs: str = "needsUnwrapping: 1") -> Path:
+    """Three pictures of 80 x 80 of a ring that is bright ahead (up), from 30 degrees to the left to 30 to the right."""
+    by_hand(
+        folder, PUBLISHED, YAML.replace("needsUnwrapping: 0", needs).replace("[ 8, 4 ]", "[ 80, 80 ]") + yaml, images=0
+    )
+    y, x = np.mgrid[:80, :80] - 40
+    bright = (np.abs(np.arctan2(x, -y)) < np.radians(30)) * np.uint8(200)
+    for i in range(3):
+        cv2.imwrite(str(folder / f"image_{i:05d}.png"), np.repeat(bright[..., None], 3, axis=2))
+    return folder
+
+
+def test_raw_pictures_are_unwrapped_as_the_metadata_has_it(tmp_path):
+    views = read_database(ring_database(tmp_path / "d")).views()
+    assert views.shape == (3, 28, 140, 3)  # 28 pixels from 8 to 36, 138 around the circle halfway
+    bright = views[0, 14, :, 0] > 100
+    assert np.flatnonzero(bright).tolist() == list(range(58, 82))  # 24 of 140 columns in the middle: 60 degrees
+    turned = read_database(
+        ring_database(tmp_path / "t", RING.replace("offsetDegrees: 0.", "offsetDegrees: 90."))
+    ).views()
+    assert np.array_equal(np.flatnonzero(turned[0, 14, :, 0] > 100), np.arange(23, 47))
+    sized = read_database(ring_database(tmp_path / "s", RING + "      size: [ 72, 10 ]\n"))
+    assert sized.views([0]).shape == (1, 10, 72, 3)
+    assert check_database(tmp_path / "d") == []
+
+
+def test_raw_pictures_without_a_way_to_unwrap_them_are_refused(tmp_path):
+    for i, yaml in enumerate(
+        ("", RING.replace("inner", "inward"), RING.replace("0.45", "0.05"), RING.replace("[ 0.5, 0.5 ]", "0.5"))
+    ):
+        folder = ring_database(tmp_path / str(i), yaml)
+        with pytest.raises(InputError, match=METADATA) as refusal:
+            read_database(folder).views()
+        assert "\n" not in str(refusal.value)
+        assert [each.kind for each in check_database(folder)] == ["needs-unwrapping"]
+    assert "tussock unwrap" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("needs", "unwrapped"),
+    [("needsUnwrapping: 0", False), ("other: 0", False), ("needsUnwrapping: 1", True), ("panoramic", True)],
+)
+def test_whether_pictures_are_raw(tmp_path, needs, unwrapped):
+    folder = ring_database(tmp_path / "d", needs="other: 0" if needs == "panoramic" else needs)
+    if needs == "panoramic":  # a camera that is, and pictures that are square
+        text = (folder / METADATA).read_text().replace("isPanoramic: 0", "isPanoramic: 1")
+        (folder / METADATA).write_text(text)
+    assert (read_database(folder).views([0]).shape != (1, 80, 80, 3)) == unwrapped
+
+
+def test_the_kind_of_a_database_without_metadata_is_guessed(tmp_path, caplog):
+    folder = by_hand(tmp_path / "d", PUBLISHED)
+    (folder / METADATA).unlink()
+    assert read_database(folder).kind == "route"
+    assert "read as a route" in caplog.text
+    assert read_database(folder).write(tmp_path / "copy").kind == "route"
+    rows = PUBLISHED.replace("Filename", "Filename, Grid X, Grid Y, Grid Z").replace(".png", ".png, 0, 0, 0")
+    (folder / ENTRIES).write_text(rows)
+    assert read_database(folder).kind == "grid"
+
+
+def test_pointers_of_git_lfs_are_named(tmp_path):
+    pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:" + b"0" * 64 + b"\nsize 12345\n"
+    for name in (ENTRIES, METADATA, "image_00001.png", "drive.avi"):
+        folder = tmp_path / name
+        video_database(folder) if name == "drive.avi" else by_hand(folder, PUBLISHED)
+        (folder / name).write_bytes(pointer)
+        with pytest.raises(InputError, match=f"{name} is only a pointer of Git LFS.*git lfs pull"):
+            read_database(folder).views()
+        assert any("git lfs pull" in each.what for each in check_database(folder))
 
 
 # Copying.

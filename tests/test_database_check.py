@@ -144,7 +144,7 @@ def test_damaged_metadata_and_entries(route):
     (route / METADATA).write_text("%YAML:1.0\n---\nmetadata: [\n")
     assert only(route, "damaged-metadata").where == METADATA
     (route / METADATA).unlink()
-    assert "there is no" in only(route, "damaged-metadata").what
+    assert check_database(route) == []  # it is guessed, and logged
     write_metadata(route / METADATA, {"type": "film"})
     assert "'film'" in only(route, "damaged-metadata").what
     write_metadata(route / METADATA, {"type": "route"})
@@ -152,7 +152,7 @@ def test_damaged_metadata_and_entries(route):
     assert "line 9" in only(route, "damaged-entries").what
 
 
-@pytest.mark.parametrize("value", [1, "x", [], {}, {"resolution": "x", "size": [1], "views": {}}, [None]])
+@pytest.mark.parametrize("value", [0, "x", [], {}, {"resolution": "x", "size": [1], "views": {}}, [None]])
 def test_metadata_of_another_structure_is_not_a_problem(grid, value):
     metadata = read_metadata(grid / METADATA)
     write_metadata(grid / METADATA, metadata | dict.fromkeys(("grid", "camera", "tussock", "needsUnwrapping"), value))
@@ -333,7 +333,7 @@ def test_views_that_do_not_face_along_their_headings(grid, turn, message):
 def test_axes_are_undetermined_without_panoramas_or_structure(correct, tmp_path):
     folder = relabelled(correct / "grid", tmp_path / "g", lambda i, j: (j, i))
     replace(folder / METADATA, ("needsUnwrapping: 0", "needsUnwrapping: 1"))
-    assert check_database(folder) == []
+    assert only(folder, "needs-unwrapping").where == METADATA
     replace(folder / METADATA, ("needsUnwrapping: 1", "needsUnwrapping: 0"))
     for path in folder.glob("*.png"):
         cv2.imwrite(str(path), np.full((6, 24, 3), 90, dtype=np.uint8))
@@ -359,3 +359,15 @@ def test_the_sussex_grid_and_routes_are_correct(tmp_path, sussex):
         for name in ("ant1_route1", "ant4_route1"):
             write_database(tmp_path / name, renderer, read_route(sussex / f"{name}.bin").resampled(0.05).poses)
             assert check_database(tmp_path / name) == []
+
+
+def test_a_convention_that_was_found_is_read_with_its_flag(route):
+    text = (route / ENTRIES).read_text().splitlines()
+    rows = [line.split(", ") for line in text[1:]]
+    changed = [", ".join([*row[:3], str(90 - float(row[3])), *row[4:]]) for row in rows]  # counter-clockwise from +x
+    (route / ENTRIES).write_text("\n".join([text[0], *changed]) + "\n")
+    assert "--headings ccw" in only(route, "heading-convention").what
+    assert check_database(route, "ccw") == check_database(route, "as-is") == []
+    assert np.allclose(read_database(route, "ccw").poses, curve(), atol=1e-9)
+    with pytest.raises(InputError, match="headings are 'north'"):
+        read_database(route, "north")

@@ -14,9 +14,10 @@ from safetensors.torch import save_file
 from tussock.navigation.models import make_model
 from tussock.navigation.models.files import load_model
 from tussock.render import Eye, open_renderer
-from tussock.render.images.database import read_database, read_image
+from tussock.render.images.database import read_database
 from tussock.render.images.entries import ENTRIES, read_entries
 from tussock.render.images.metadata import METADATA
+from tussock.render.images.pictures import read_image
 from tussock.world.errors import InputError
 from tussock.world.files import read_world
 from tussock.world.routes import generate_route

@@ -87,6 +87,8 @@ class DatabaseCheckCommand(Command):
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
     """Folder of the database."""
+    headings: Annotated[str, tyro.conf.arg(metavar="auto|ccw|bearing|radians|path|as-is")] = "auto"
+    """How its headings are meant. auto: as bearings, which the format has; as-is leaves out their check."""
 
     def run(self) -> dict[str, Any]:
         import dataclasses
@@ -94,7 +96,7 @@ class DatabaseCheckCommand(Command):
         from tussock.render.images.check import check_database
         from tussock.render.images.database import read_database
 
-        problems = check_database(self.folder)
+        problems = check_database(self.folder, self.headings)
         try:
             database = read_database(self.folder)
             kind, images = database.kind, len(database)

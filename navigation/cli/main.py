@@ -40,13 +40,15 @@ COMMANDS: dict[str, Any] = {
     ),
     "study": "studies:StudyCommand",
     "database": (
-        "Draw image databases in the BoB format, and look for what is wrong with them.",
+        "Draw image databases in the BoB format, make them of pictures, and look for what is wrong with them.",
         {
             "grid": "databases:DatabaseGridCommand",
             "route": "databases:DatabaseRouteCommand",
+            "import": "pictures:DatabaseImportCommand",
             "check": "databases:DatabaseCheckCommand",
         },
     ),
+    "unwrap": "pictures:UnwrapCommand",
 }
 
 

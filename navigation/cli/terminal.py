@@ -16,11 +16,15 @@ def message(text: str) -> None:
 
 @contextmanager
 def library_messages() -> Iterator[None]:
-    """Print what the library logs, as messages, while the block runs."""
+    """Print what the library logs, as messages, while the block runs. The same text is printed once."""
+    printed: set[str] = set()
 
     class Handler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            message(self.format(record))
+            text = self.format(record)
+            if text not in printed:
+                printed.add(text)
+                message(text)
 
     logger = logging.getLogger("tussock")
     handler, level = Handler(logging.INFO), logger.level

@@ -1,6 +1,12 @@
-from .check import Problem as Problem
+from .camera import Camera as Camera
 from .check import check_database as check_database
 from .database import Database as Database
 from .database import read_database as read_database
+from .importing import Import as Import
+from .importing import import_database as import_database
+from .inspection import Problem as Problem
+from .panoramas import unwrap_files as unwrap_files
+from .ring_search import find_ring as find_ring
+from .unwrapping import Unwrapping as Unwrapping
 from .writing import Grid as Grid
 from .writing import write_database as write_database

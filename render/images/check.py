@@ -3,10 +3,8 @@
 import logging
 import os
 import re
-from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,95 +13,72 @@ from jaxtyping import Float
 
 from tussock.world.errors import FileError
 from tussock.world.geometry import wrap_angle
-from tussock.world.headings import Diagnosis, diagnose
+from tussock.world.headings import Diagnosis, convert, diagnose
 
-from .database import KINDS, Database, is_outside, read_image
-from .entries import ENTRIES, read_entries
+from .database import KINDS, Database, check_video_name, guessed_metadata, is_outside
+from .entries import ENTRIES, FRAME, is_grid, read_entries
 from .flow import grid_axes_error
+from .inspection import Inspection, Problem, inspected
+from .lens_metadata import stated_unwrapping
 from .metadata import METADATA, read_metadata
+from .pictures import SUFFIXES, check_content
 
 logger = logging.getLogger(__name__)
 
 POSITION_NAME = re.compile(r"_([+-]\d+)_([+-]\d+)_([+-]\d+)\.\w+$")  # mm
-IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 MAX_OFF_PATH = np.radians(60)  # a heading farther than this from the path on both sides is wrong ..
 MAX_MEDIAN = np.radians(20)  # .. unless half of them are farther than this: then the positions jitter
 REACHES = (1, 2, 4)  # rows over which the direction of the path is taken
 
 
-@dataclass(frozen=True)
-class Problem:
-    """Something wrong with a database.
+def check_database(folder: str | os.PathLike, headings: str = "auto") -> list[Problem]:
+    """All that is wrong with the database in a folder. What is only assumed about it is logged.
 
-    Attributes:
-        kind: A name for programs, which stays the same.
-        where: A file, with a line where there is one.
-        what: A sentence.
+    Args:
+        folder: The folder.
+        headings: How its headings are meant, as `read_database` takes it; as-is leaves out their check.
+
+    Raises:
+        FileError: The folder has no entries file.
+        SettingError: For an unknown convention of headings.
     """
-
-    kind: str
-    where: str
-    what: str
-
-
-@dataclass(frozen=True)
-class Inspection:
-    """A database, which may be damaged, and its images.
-
-    Attributes:
-        database: The database.
-        shapes: Shapes of the images of all rows, None where an image cannot be read.
-    """
-
-    database: Database
-    shapes: list[tuple[int, ...] | None]
-
-    @property
-    def usual_shape(self) -> tuple[int, ...] | None:
-        """Height and width of most images."""
-        usual = Counter(shape[:2] for shape in self.shapes if shape).most_common(1)
-        return usual[0][0] if usual else None
-
-    def line(self, row: int) -> str:
-        """Where a row is, for a `Problem`."""
-        return f"{ENTRIES}, line {self.database.lines[row]}"
-
-
-def check_database(folder: str | os.PathLike) -> list[Problem]:
-    """All that is wrong with the database in a folder. Raises FileError if the folder has no entries file."""
     folder = Path(folder)
     if not (folder / ENTRIES).is_file():
         raise FileError(f"there is no {folder / ENTRIES}; give the folder of an image database")
     problems, metadata = [], {}
     try:
-        metadata = read_metadata(folder / METADATA)
+        metadata = read_metadata(folder / METADATA) if os.path.lexists(folder / METADATA) else {}
     except FileError as error:
         problems.append(Problem("damaged-metadata", METADATA, str(error)))
     try:
         entries = read_entries(folder / ENTRIES)
     except FileError as error:
         return [*problems, Problem("damaged-entries", ENTRIES, str(error))]
+    if not metadata and not problems:
+        metadata = guessed_metadata(folder, entries.columns)
     kind = metadata.get("type")
     if metadata and kind not in KINDS:
         problems.append(Problem("damaged-metadata", METADATA, f"the type is {kind!r}, not {' or '.join(KINDS)}"))
     if kind not in KINDS:
-        kind = "grid" if "Grid X" in entries.columns else "route"
+        kind = "grid" if is_grid(entries.columns) else "route"
     database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
-    with ThreadPoolExecutor() as pool:
-        inspection = Inspection(database, list(pool.map(lambda name: _shape(folder, name), database.names)))
-    return problems + [problem for check in CHECKS for problem in check(inspection)]
-
-
-def _shape(folder: Path, name: str | None) -> tuple[int, ...] | None:
+    database = replace(database, poses=convert(entries.poses, headings, "bearing"))
     try:
-        return None if name is None or is_outside(folder, name) else read_image(folder / name).shape
-    except FileError:
-        return None
+        if database.frames is not None:
+            check_video_name(folder, metadata)
+        inspection = inspected(database)
+    except FileError as error:  # about the video
+        return [*problems, Problem("unreadable-video", METADATA, str(error))]
+    checks = [check for check in CHECKS if check is not check_headings or headings != "as-is"]
+    return problems + [problem for check in checks for problem in check(inspection)]
 
 
 def check_files(inspection: Inspection) -> Iterator[Problem]:
     """Rows without an image, with that of another row, with one outside or a damaged one; images without a row."""
     folder, lines = inspection.database.folder, {}
+    if inspection.database.frames is not None:
+        yield from _missing_frames(inspection)
+        return
     for row, name in enumerate(inspection.database.names):
         where = inspection.line(row)
         if name is None:
@@ -115,11 +90,31 @@ def check_files(inspection: Inspection) -> Iterator[Problem]:
         elif not os.path.isfile(folder / name):
             yield Problem("missing-image", where, f"there is no {name}")
         elif inspection.shapes[row] is None:
-            yield Problem("unreadable-image", name, "it is not an image of 8 bits, or not complete")
+            yield Problem("unreadable-image", name, _why_unreadable(folder / name))
         lines.setdefault(name, inspection.database.lines[row])
+    tussock = inspection.database.metadata.get("tussock")
+    eye = tussock.get("eye") if isinstance(tussock, dict) else None
+    mask = eye.get("mask") if isinstance(eye, dict) else None
     for path in sorted(folder.iterdir()):
-        if path.suffix.lower() in IMAGES and not path.name.startswith(".") and path.name not in lines:
+        if path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.name not in {*lines, mask}:
             yield Problem("unlisted-image", path.name, "no row names it")
+
+
+def _missing_frames(inspection: Inspection) -> Iterator[Problem]:
+    """Rows of frames that the video does not have."""
+    numbers = inspection.database.frames or ()
+    for row, number in enumerate(numbers):
+        if inspection.shapes[row] is None:
+            what = f"{FRAME} is {number}; the video ends before it"
+            yield Problem("missing-frame", inspection.line(row), what)
+
+
+def _why_unreadable(path: Path) -> str:
+    try:
+        check_content(path)
+    except FileError:
+        return "it is only a pointer of Git LFS, not the image itself; run git lfs pull in its repository"
+    return "it is not an image of 8 bits, or not complete"
 
 
 def check_sizes(inspection: Inspection) -> Iterator[Problem]:
@@ -244,10 +239,20 @@ def check_extent(inspection: Inspection) -> Iterator[Problem]:
         yield Problem("grid-metadata", inspection.line(wrong[0]), what)
 
 
+def check_unwrapping(inspection: Inspection) -> Iterator[Problem]:
+    """Raw pictures without a way to unwrap them."""
+    if inspection.needs_unwrapping and inspection.usual_shape is not None:
+        try:
+            height, width = inspection.usual_shape[:2]
+            stated_unwrapping(inspection.database.metadata, height, width, Path(METADATA))
+        except FileError as error:
+            yield Problem("needs-unwrapping", METADATA, str(error))
+
+
 def check_axes(inspection: Inspection) -> Iterator[Problem]:
     """Axes of a grid that are exchanged, mirrored or turned, as its views show."""
     database = inspection.database
-    if database.kind == "grid" and not database.metadata.get("needsUnwrapping"):
+    if database.kind == "grid" and not inspection.needs_unwrapping:
         usable = [shape is not None and shape[:2] == inspection.usual_shape for shape in inspection.shapes]
         if error := grid_axes_error(database, np.flatnonzero(usable)):
             yield Problem("grid-axes", ENTRIES, error)
@@ -262,4 +267,4 @@ def _numbers(metadata: dict[str, Any], group: str, name: str, at_least: int = 2)
     return numbers if len(numbers) == len(values) >= at_least else None
 
 
-CHECKS = (check_files, check_sizes, check_names, check_headings, check_extent, check_axes)
+CHECKS = (check_files, check_sizes, check_unwrapping, check_names, check_headings, check_extent, check_axes)

@@ -4,28 +4,32 @@ The format is used at Sussex, Sheffield and Imperial. A row of a route has the b
 was taken facing there.
 """
 
+import logging
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
-from PIL import Image
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
 from tussock.world.headings import convert
 
-from .entries import ENTRIES, Columns, read_entries, write_entries
+from .entries import ENTRIES, Columns, is_grid, read_entries, write_entries
+from .lens_metadata import needs_unwrapping, stated_unwrapping
 from .metadata import METADATA, read_metadata, write_metadata
+from .pictures import Picture, check_exists, read_image
+from .video import frames
+
+log = logging.getLogger(__name__)
 
 KINDS = ("route", "grid")
-FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
-MAX_PIXELS = 8 * 10**7  # of an image, because a small file may claim any size; Pillow itself warns above 89 million
+ALPHA_SAMPLE = 16  # images by which it is decided whether alpha may be opaque in all of them
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,9 +40,10 @@ class Database:
         folder: The folder.
         kind: "route" or "grid".
         metadata: All that the metadata file has.
-        poses: x (m), y (m) and heading (rad) of each row, nan where a cell is empty.
+        poses: x (m), y (m) and heading (rad) of each row, nan where a cell is empty. Nothing is taken off positions far from 0.
         z: Heights (m), nan where a cell is empty.
-        names: Image files in the folder, None where a cell is empty.
+        names: Image files in the folder, None where a cell is empty or the rows are frames of a video.
+        frames: Frame of the video for each row, None where the rows name image files.
         columns: All columns of the entries as text, unknown ones too.
         lines: Line of the entries file for each row.
     """
@@ -49,42 +54,86 @@ class Database:
     poses: Float[np.ndarray, "n 3"]
     z: Float[np.ndarray, " n"]
     names: tuple[str | None, ...]
+    frames: tuple[int, ...] | None
     columns: Columns
     lines: list[int]
 
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def video(self) -> Path | None:
+        """The video whose frames the rows are, None where they name image files."""
+        return None if self.frames is None else self.folder / str(self.metadata.get("videoFile"))
+
     def views(
         self, rows: slice | Sequence[int] | np.ndarray | None = None
     ) -> UInt8[np.ndarray, "m height width channels"]:
-        """Read the images of some rows, or of all.
+        """Read the panoramas of some rows, or of all. Raw pictures are unwrapped, if the metadata has how.
 
         Args:
-            rows: Which rows; None is all.
+            rows: Which rows; None is all. A video is read from its beginning by each call.
 
         Returns:
-            RGB, or RGBA as the renderers give it. Grey images have three equal channels.
+            RGB, or RGBA as the renderers give it. Grey images have three equal channels. Alpha that is opaque in all images of the
+            database does not say what is open sky, and is dropped.
 
         Raises:
-            FileError: An image is missing, damaged, or of another size than the first.
+            FileError: An image is missing, damaged, or of another size than the first; or how to unwrap it is not known.
         """
         chosen = np.arange(len(self))[slice(None) if rows is None else rows].tolist()
-        paths = [self._path(row) for row in chosen]
-        with ThreadPoolExecutor() as pool:
-            views = list(pool.map(read_image, paths))
-        for path, view in zip(paths, views, strict=True):
+        views = self._pictures(chosen)
+        if any(view.shape[2] == 4 for view in views) and self.is_opaque:
+            views = [view[..., :3] for view in views]
+        for row, view in zip(chosen, views, strict=True):
             if view.shape != views[0].shape:
                 raise FileError(
-                    f"{path} is {_size(view)}, {paths[0].name} is {_size(views[0])}; give images of one size"
+                    f"{self.folder / self.label(row)} is {_size(view)}, {self.label(chosen[0])} is {_size(views[0])}; "
+                    "give images of one size"
                 )
+        height, width = views[0].shape[:2] if views else (0, 0)
+        if views and needs_unwrapping(self.metadata, height, width):
+            unwrapping = stated_unwrapping(self.metadata, height, width, self.folder / METADATA)
+            views = [unwrapping(view) for view in views]
         return np.stack(views) if views else np.empty((0, 0, 0, 3), dtype=np.uint8)
+
+    def label(self, row: int) -> str:
+        """The image of a row, for messages."""
+        return self.names[row] or f"frame {self.frames[row]}" if self.frames else str(self.names[row])
+
+    def _pictures(self, rows: list[int]) -> list[Picture]:
+        """The pictures of rows as they are stored."""
+        if self.frames is not None and self.video is not None:
+            read = dict(frames(self.video, [self.frames[row] for row in rows])) if rows else {}
+            return [read[self.frames[row]] for row in rows]
+        paths = [self._path(row) for row in rows]
+        with ThreadPoolExecutor() as pool:
+            return list(pool.map(read_image, paths))
 
     def _path(self, row: int) -> Path:
         name = self.names[row]
         if name is None:
             raise FileError(f"{self.folder / ENTRIES}: row {row} names no image; choose other rows")
         return self.folder / name
+
+    @cached_property
+    def is_opaque(self) -> bool:
+        """Whether no image has any transparent pixel, although some have alpha. Decided once; then logged."""
+        names = list(dict.fromkeys(filter(None, self.names)))
+        sample = names[:: max(1, len(names) // ALPHA_SAMPLE)]
+        with ThreadPoolExecutor() as pool:
+            for some in (sample, names):  # all are read only where a sample has no transparent pixel
+                for start in range(0, len(some), 64):
+                    if any(pool.map(self._is_transparent, some[start : start + 64])):
+                        return False
+        log_opaque(self.folder)
+        return True
+
+    def _is_transparent(self, name: str) -> bool:
+        try:
+            return is_transparent(read_image(self.folder / name))
+        except FileError:  # reported where it is needed
+            return False
 
     def write(self, folder: str | os.PathLike) -> "Database":
         """Copy the database: images byte for byte, entries and metadata completely.
@@ -96,9 +145,9 @@ class Database:
             FileError: The folder is not empty, or an image is missing.
         """
         folder = Path(folder)
-        names = dict.fromkeys(name for name in self.names if name is not None)
+        names = [str(self.metadata.get("videoFile"))] if self.frames else list(dict.fromkeys(filter(None, self.names)))
         for name in names:
-            _check_exists(self.folder / name)
+            check_exists(self.folder / name)
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise FileError(f"{folder} exists already and is not empty; give a new folder")
         make_folder(folder)
@@ -112,26 +161,65 @@ class Database:
 
 
 def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database:
-    """Open the image database in a folder.
+    """Open the image database in a folder. Without a metadata file, its kind is guessed from its columns, and that is logged.
 
     Args:
         folder: The folder.
-        headings: How its headings are meant, one of `tussock.world.headings.HEADINGS`; "auto" and "as-is" are bearings.
+        headings: How its headings are meant, one of `tussock.world.headings.HEADINGS`; "auto" and "as-is" are bearings, which the
+            format has.
 
     Raises:
-        FileError: Its entries or metadata are missing or damaged, list no images, or name files outside the folder.
+        FileError: Its entries are missing, its files are damaged, list no images, or name files outside the folder.
+        SettingError: For an unknown convention of headings.
     """
     folder = Path(folder)
     entries = read_entries(folder / ENTRIES)
     for name, line in zip(entries.names, entries.lines, strict=True):
         if name is not None and is_outside(folder, name):
             raise FileError(f"{folder / ENTRIES}, line {line}: {name!r} is not in the folder; name files inside it")
-    metadata = read_metadata(folder / METADATA)
+    metadata = (
+        read_metadata(folder / METADATA)
+        if os.path.lexists(folder / METADATA)
+        else guessed_metadata(folder, entries.columns)
+    )
     kind = metadata.get("type")
     if kind not in KINDS:
         raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
-    poses = convert(entries.poses, headings, "bearing")
-    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries) | {"poses": poses})
+    if entries.frames is not None:
+        check_video_name(folder, metadata)
+    database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
+    return replace(database, poses=convert(entries.poses, headings, "bearing"))
+
+
+def check_video_name(folder: Path, metadata: dict[str, Any]) -> None:
+    """Refuse metadata that does not name a video in the folder. Raises FileError."""
+    name = metadata.get("videoFile")
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise FileError(f"{folder / METADATA} names no videoFile, whose frames {ENTRIES} lists; write it there")
+    if is_outside(folder, name):
+        raise FileError(f"{folder / METADATA}: the videoFile {name!r} is not in the folder; name a file inside it")
+
+
+def guessed_metadata(folder: Path, columns: Columns) -> dict[str, Any]:
+    """Metadata of a database that has none."""
+    kind = "grid" if is_grid(columns) else "route"
+    why = "it has grid columns" if kind == "grid" else "it has no grid columns"
+    log.warning("%s has no %s; it is read as a %s, because %s", folder, METADATA, kind, why)
+    return {"type": kind}
+
+
+def is_transparent(picture: Picture) -> bool:
+    """Whether any pixel is not opaque."""
+    return picture.shape[2] == 4 and bool((picture[..., 3] < 255).any())
+
+
+def log_opaque(folder: Path) -> None:
+    """Log what is assumed of a database whose images have alpha that is opaque everywhere."""
+    log.warning(
+        "%s: alpha is 255 in all pixels of all images, so it does not say what is open sky; it is dropped, and open sky is estimated "
+        "from colours",
+        folder,
+    )
 
 
 def is_outside(folder: Path, name: str) -> bool:
@@ -150,38 +238,6 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"the folder {folder} cannot be made ({error.strerror}); give another") from error
-
-
-def read_image(path: Path) -> UInt8[np.ndarray, "height width channels"]:
-    """Read an image as RGB or RGBA. Raises FileError if it is missing, too large or cannot be read to its end."""
-    _check_exists(path)
-    damaged = f"{path} cannot be read as an image of 8 bits; replace it"
-    try:
-        with Image.open(path, formats=FORMATS) as header:  # reads the header only
-            width, height = header.size
-    except Image.DecompressionBombError as error:
-        raise FileError(f"{path} is too large; give images of up to {MAX_PIXELS:,} pixels") from error
-    except Exception as error:  # Pillow raises whatever its parsers raise
-        raise FileError(damaged) from error
-    if width * height > MAX_PIXELS:
-        raise FileError(f"{path} is {width} x {height}; give images of up to {MAX_PIXELS:,} pixels")
-    try:
-        data = path.read_bytes()
-        # libpng complains on standard error about a file that is cut off.
-        whole = data[1:4] != b"PNG" or b"IEND" in data[-12:]
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if whole else None
-    except (cv2.error, OSError):
-        image = None
-    if image is None or image.dtype != np.uint8 or image.ndim not in (2, 3):
-        raise FileError(damaged)
-    if image.ndim == 2:
-        return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
-    return cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
-
-
-def _check_exists(path: Path) -> None:
-    if not os.path.isfile(path):  # unlike Path.is_file, False for names that are too long
-        raise FileError(f"there is no image {path}; a check of the database lists all that are missing")
 
 
 def _size(view: np.ndarray) -> str:

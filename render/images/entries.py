@@ -17,11 +17,14 @@ from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, SettingError
 
 from ..poses import Poses, as_poses
+from .pictures import check_content
 
 ENTRIES = "database_entries.csv"
 X, Y, Z, HEADING, FILENAME = "X [mm]", "Y [mm]", "Z [mm]", "Heading [degrees]", "Filename"
+FRAME = "Frame"  # of a video, instead of a file name
 
-MAX_NUMBER = 1e9  # in a file; up to here nanometres are whole float64 numbers
+MAX_NUMBER = 1e9  # in a file that is written; up to here nanometres are whole float64 numbers
+MAX_POSITION = 1e11  # mm in a file that is read; metres from the equator (UTM) are up to 1e10 mm
 MAX_COLUMNS = 1000  # each row has a cell in each, however short its line is
 FULL_TURN = 360e9  # in 1e-9 degrees
 
@@ -35,7 +38,8 @@ class Entries:
     Attributes:
         columns: All columns as text, unknown ones too, in their order.
         lines: Line of the file for each row.
-        names: Names of the images in the folder, None where the cell is empty.
+        names: Names of the images in the folder, None where the cell is empty or the rows are frames.
+        frames: Frame of a video for each row, None where the rows name images.
         poses: x (m), y (m) and heading (rad), nan where the cell is empty.
         z: Heights (m), nan where the cell is empty.
     """
@@ -43,6 +47,7 @@ class Entries:
     columns: Columns
     lines: list[int]
     names: tuple[str | None, ...]
+    frames: tuple[int, ...] | None
     poses: Float[np.ndarray, "n 3"]
     z: Float[np.ndarray, " n"]
 
@@ -51,18 +56,38 @@ def read_entries(path: Path) -> Entries:
     """Read an entries file. Raises FileError with the line that cannot be used."""
     if not os.path.isfile(path):  # unlike Path.is_file, False for names that are too long
         raise FileError(f"there is no {path}; an image database is a folder that contains this file")
+    check_content(path)
     columns, lines = _read_columns(path)
-    if FILENAME not in columns and "Frame" in columns:
-        raise FileError(f"{path} lists the frames of a video; extract them into image files with a column {FILENAME!r}")
-    for name in (X, Y, FILENAME):
+    is_video = FILENAME not in columns and FRAME in columns
+    for name in (X, Y) if is_video else (X, Y, FILENAME):
         if name not in columns:
-            raise FileError(f"{path}, line 1: there is no column {name!r}; a database has {X}, {Y} and {FILENAME}")
-    for name, line in zip(columns[FILENAME], lines, strict=True):
+            raise FileError(
+                f"{path}, line 1: there is no column {name!r}; a database has {X}, {Y} and {FILENAME} (or {FRAME}). "
+                "tussock database import makes a database of other tables"
+            )
+    for name, line in zip(columns.get(FILENAME, ()), lines, strict=False):
         if "\0" in name or len(name.splitlines()) > 1:
             raise FileError(f"{path}, line {line}: {name!r} is not a valid file name; give one without line breaks")
-    x, y, z, bearing = (_numbers(path, columns, name, lines) for name in (X, Y, Z, HEADING))
+    x, y, z = (_numbers(path, columns, name, lines, MAX_POSITION) for name in (X, Y, Z))
+    bearing = _numbers(path, columns, HEADING, lines)
     poses = from_file_units(np.rint(np.column_stack([x * 1e6, y * 1e6, bearing * 1e9])))
-    return Entries(columns, lines, tuple(name or None for name in columns[FILENAME]), poses, z / 1e3)
+    names = (None,) * len(lines) if is_video else tuple(name or None for name in columns[FILENAME])
+    frames = _frames(path, columns, lines) if is_video else None
+    return Entries(columns, lines, names, frames, poses, z / 1e3)
+
+
+def is_grid(columns: Columns) -> bool:
+    """Whether columns are those of a grid."""
+    return any(name in columns for name in ("Grid X", "Grid Y", "Grid Z"))
+
+
+def _frames(path: Path, columns: Columns, lines: list[int]) -> tuple[int, ...]:
+    """The frame of each row."""
+    numbers = _numbers(path, columns, FRAME, lines)
+    for number, line in zip(numbers, lines, strict=True):
+        if not (number >= 0 and number == int(number)):
+            raise FileError(f"{path}, line {line}: {FRAME} is not a whole number from 0; give one")
+    return tuple(int(number) for number in numbers)
 
 
 def _read_columns(path: Path) -> tuple[Columns, list[int]]:
@@ -101,7 +126,9 @@ def _header(cells: list[str], path: Path) -> list[str]:
     return header
 
 
-def _numbers(path: Path, columns: Columns, name: str, lines: list[int]) -> Float[np.ndarray, " n"]:
+def _numbers(
+    path: Path, columns: Columns, name: str, lines: list[int], limit: float = MAX_NUMBER
+) -> Float[np.ndarray, " n"]:
     """The numbers in a column, nan where a cell is empty or the column is missing."""
     numbers = np.full(len(lines), np.nan)
     for row, cell in enumerate(columns.get(name, ())):
@@ -109,8 +136,8 @@ def _numbers(path: Path, columns: Columns, name: str, lines: list[int]) -> Float
             continue
         with suppress(ValueError):
             numbers[row] = float(cell)
-        if not abs(numbers[row]) < MAX_NUMBER:
-            raise FileError(f"{path}, line {lines[row]}: {name} is {cell!r}; give a number under {MAX_NUMBER:.0e}")
+        if not abs(numbers[row]) < limit:
+            raise FileError(f"{path}, line {lines[row]}: {name} is {cell!r}; give a number under {limit:.0e}")
     return numbers
 
 

@@ -12,7 +12,7 @@ from jaxtyping import Float, Float32, Int
 
 from tussock.world.geometry import column_azimuths
 
-from .database import Database, read_image
+from .database import Database
 
 COLUMNS, ROWS = 90, 12  # of the reduced views that are compared; 4 degrees a column, as in Baddeley et al. 2012
 DIRECTIONS = np.radians([0, 90, 180, 270])
@@ -56,7 +56,7 @@ def grid_axes_error(database: Database, rows: Int[np.ndarray, " m"]) -> str | No
         if len(pairs) < MIN_PAIRS:
             return None
         pairs = pairs[rng.permutation(len(pairs))[:MAX_PAIRS]]
-        before, after = (np.stack([_reduced(database, row) for row in column]) for column in pairs.T.tolist())
+        before, after = (_reduced(database, column) for column in pairs.T)
         costs = _costs(before, after, database.poses[pairs[:, 0], 2], database.poses[pairs[:, 1], 2])
         costs[:, axis] -= 1e-3  # grey levels, so that equal costs are votes for the label
         votes.append(np.bincount(costs.argmin(axis=1), minlength=4) / len(pairs))
@@ -83,11 +83,15 @@ def _neighbours(poses: Float[np.ndarray, "n 3"], rows: Int[np.ndarray, " m"]) ->
     return neighbours
 
 
-def _reduced(database: Database, row: int) -> Float32[np.ndarray, "height width"]:
-    view = read_image(database.folder / (database.names[row] or ""))
-    grey = cv2.cvtColor(np.ascontiguousarray(view[..., :3]), cv2.COLOR_RGB2GRAY).astype(np.float32)
-    size = min(COLUMNS, grey.shape[1]), min(ROWS, grey.shape[0])
-    return cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+def _reduced(database: Database, rows: Int[np.ndarray, " n"]) -> Float32[np.ndarray, "n height width"]:
+    """Grey views of rows in few pixels."""
+    reduced = []
+    for start in range(0, len(rows), 25):
+        for view in database.views(rows[start : start + 25]):
+            grey = cv2.cvtColor(np.ascontiguousarray(view[..., :3]), cv2.COLOR_RGB2GRAY).astype(np.float32)
+            size = min(COLUMNS, grey.shape[1]), min(ROWS, grey.shape[0])
+            reduced.append(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+    return np.stack(reduced)
 
 
 def _costs(

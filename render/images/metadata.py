@@ -15,8 +15,11 @@ import cv2
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
 
+from .pictures import check_content
+
 METADATA = "database_metadata.yaml"
 
+MAX_BYTES = 10**7
 MAX_DEPTH = 1000  # levels of nesting; OpenCV's parser overflows its stack somewhere above 10,000
 PLAIN = re.compile(r"[A-Za-z_]([A-Za-z0-9_ -]*[A-Za-z0-9_])?")  # text that YAML reads as text without quotes ..
 NOT_TEXT = ("true", "false", "null", "nan", "inf", "yes", "no", "on", "off", "y", "n")  # .. except for these
@@ -34,19 +37,30 @@ def read_metadata(path: Path) -> dict[str, Any]:
     """
     if not os.path.isfile(path):  # unlike Path.is_file, False for names that are too long
         raise FileError(f"there is no {path}; an image database is a folder that contains this file")
+    root = read_storage(path).get("metadata")
+    if not isinstance(root, dict):
+        raise FileError(f"{path} has no 'metadata'; give the metadata of a database")
+    return root
+
+
+def read_storage(path: Path) -> dict[str, Any]:
+    """Read a file of OpenCV's FileStorage: YAML, JSON or XML. Raises FileError; the message names the line if it is known."""
+    check_content(path)
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"it is larger than {MAX_BYTES:,} bytes")
         return _parse(path.read_text(encoding="utf-8-sig"))
     except (ValueError, OSError, SystemError, cv2.error) as error:
         match = re.search(r"\((\d+)\): ([^'\n]+)", str(error.__cause__ or error))
         line, reason = (f", line {match[1]}", match[2]) if match else ("", str(error).splitlines()[0])
-        raise FileError(f"{path}{line} cannot be read as the YAML of a database ({reason}); repair it") from error
+        raise FileError(f"{path}{line} cannot be read as YAML, as OpenCV writes it ({reason}); repair it") from error
 
 
 def write_metadata(path: Path, metadata: dict[str, Any]) -> None:
     """Write a metadata file. Raises FileError if reading would not return the same metadata."""
     text = "%YAML:1.0\n---\n" + "\n".join(_block({"metadata": metadata}, "")) + "\n"
     try:
-        same = repr(_parse(text)) == repr(metadata)  # repr, because nan is not equal to itself
+        same = repr(_parse(text).get("metadata")) == repr(metadata)  # repr, because nan is not equal to itself
     except (ValueError, SystemError, cv2.error):
         same = False
     if not same:
@@ -56,15 +70,19 @@ def write_metadata(path: Path, metadata: dict[str, Any]) -> None:
 
 
 def _parse(text: str) -> dict[str, Any]:
-    """The map under `metadata` of a YAML text. Raises ValueError, cv2.error or, as cv2 sometimes does, SystemError."""
+    """All that a text holds. Raises ValueError, cv2.error or, as cv2 sometimes does, SystemError."""
+    if not text.lstrip().startswith(
+        ("%", "{", "<")
+    ):  # YAML without its first line, which readers of BoB robotics do not need
+        text = f"%YAML:1.0\n---\n{text}"
     depth = max(len(line) - len(line.lstrip(" ")) + line.count("-") + line.count(":") for line in text.split("\n"))
     if depth + sum(map(text.count, "[{<")) > MAX_DEPTH:
         raise ValueError("nested too deeply")
     storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)  # its nodes do not outlive it
-    root = storage.getNode("metadata")
-    if not root.isMap():
-        raise ValueError("it has no 'metadata'")
-    return _value(root)
+    root = _value(storage.root())
+    if not isinstance(root, dict):
+        raise ValueError("it has no names")
+    return root
 
 
 def _value(node: Any) -> Any:

@@ -3,41 +3,24 @@
 import hashlib
 import os
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import attrs
-import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
-from tussock.world.atomic import replacing
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
 
 from ..poses import Poses
 from ..renderer import Renderer
-from .database import Database, make_folder, read_database
-from .entries import (
-    ENTRIES,
-    FILENAME,
-    HEADING,
-    Columns,
-    X,
-    Y,
-    Z,
-    format_decimal,
-    read_entries,
-    stored_poses,
-    to_file_units,
-    write_entries,
-)
-from .metadata import METADATA, read_metadata, write_metadata
+from .completing import complete, missing_rows, start_or_resume
+from .database import Database, read_database
+from .entries import FILENAME, HEADING, Columns, X, Y, Z, format_decimal, stored_poses, to_file_units
 
-BATCH = 64  # views that are rendered while those before them are encoded
 MAX_VIEWS = 10**6  # of a grid
 MIN_SPACING = 0.001  # m, because the names of images have whole millimetres
 
@@ -118,12 +101,9 @@ def write_database(
     folder, grid = Path(folder), poses if isinstance(poses, Grid) else None
     stored = stored_poses(poses.poses() if isinstance(poses, Grid) else poses)
     columns = _columns(stored, renderer.eye.z, grid)
-    _start_or_resume(folder, _metadata(renderer, stored, grid))
-    missing = _missing_rows(folder, columns)
-    for path in _partial_files(folder):
-        path.unlink(missing_ok=True)
-    if missing:
-        _draw(folder, renderer, stored, columns, missing, progress)
+    start_or_resume(folder, _metadata(renderer, stored, grid))
+    missing = missing_rows(folder, columns)
+    complete(folder, columns, missing, lambda rows: renderer.render(stored[rows]), progress)
     return read_database(folder), len(missing)
 
 
@@ -176,73 +156,3 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
         metadata["grid"] = {"beginAtMM": begin, "separationMM": [spacing, spacing, 0.0], "size": [*grid.size, 1]}
     camera = {"name": "tussock", "resolution": [eye.width, eye.height], "isPanoramic": 0}
     return metadata | {"camera": camera, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": tussock}
-
-
-def _start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
-    """Start a database in a new or empty folder, or resume the same one. Raises FileError if the folder holds anything else."""
-    if (folder / METADATA).is_file():
-        theirs = read_metadata(folder / METADATA)
-        for name, value in {"type": metadata["type"], **metadata["tussock"]}.items():
-            group = theirs if name == "type" else theirs.get("tussock")
-            if not isinstance(group, dict) or group.get(name) != value:
-                raise FileError(f"{folder} holds an image database that differs in its {name}; give another folder")
-    elif folder.exists() and (not folder.is_dir() or set(folder.iterdir()) - set(_partial_files(folder))):
-        raise FileError(f"{folder} exists already and is not an image database; give a new folder")
-    else:
-        make_folder(folder)
-        write_metadata(folder / METADATA, metadata)
-
-
-def _partial_files(folder: Path) -> list[Path]:
-    """The temporary files of a call that was killed."""
-    return [*folder.glob(".image_*.partial.png"), *folder.glob(".database_*.partial.*")]
-
-
-def _missing_rows(folder: Path, columns: Columns) -> list[int]:
-    """Rows that are not in the entries of the folder, or whose image is missing."""
-    listed = set()
-    if (folder / ENTRIES).is_file():
-        theirs = read_entries(folder / ENTRIES).columns
-        if list(theirs) != list(columns):
-            raise FileError(f"{folder / ENTRIES} was changed since it was written; give another folder")
-        listed = set(zip(*theirs.values(), strict=True))
-    rows = zip(*columns.values(), strict=True)
-    images = {path.name for path in folder.glob("image_*.png")}
-    return [i for i, row in enumerate(rows) if row not in listed or columns[FILENAME][i] not in images]
-
-
-def _draw(
-    folder: Path,
-    renderer: Renderer,
-    poses: Float[np.ndarray, "n 3"],
-    columns: Columns,
-    missing: list[int],
-    progress: Progress,
-) -> None:
-    """Draw the images of the missing rows. The entries list each batch when all of its images are saved."""
-    done = np.ones(len(poses), dtype=bool)
-    done[missing] = False
-
-    def finish(rows: list[int], saving: list[Future]) -> None:
-        for image in saving:
-            image.result()
-        done[rows] = True
-        listed = np.flatnonzero(done).tolist()
-        write_entries(folder / ENTRIES, {name: tuple(cells[i] for i in listed) for name, cells in columns.items()})
-        progress(len(listed), len(done))
-
-    with ThreadPoolExecutor() as pool:
-        before: tuple[list[int], list[Future]] = ([], [])
-        for start in range(0, len(missing), BATCH):
-            rows = missing[start : start + BATCH]
-            views = renderer.render(poses[rows])
-            finish(*before)
-            paths = [folder / columns[FILENAME][row] for row in rows]
-            before = rows, [pool.submit(_save, path, view) for path, view in zip(paths, views, strict=True)]
-        finish(*before)
-
-
-def _save(path: Path, view: UInt8[np.ndarray, "height width 4"]) -> None:
-    data = cv2.imencode(".png", cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    with replacing(path) as partial:
-        partial.write_bytes(data.tobytes())

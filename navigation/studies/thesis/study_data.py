@@ -171,8 +171,6 @@ def _read(folder: Path, kind: str, headings: str) -> Database:
     database = read_database(folder, headings)
     if database.kind != kind:
         raise FileError(f"{database.folder} is a database of a {database.kind}; give one of a {kind}")
-    if database.metadata.get("needsUnwrapping"):
-        raise FileError(f"{database.folder} holds images that need unwrapping; a study needs panoramas")
     bad = np.flatnonzero(~np.isfinite(database.poses).all(axis=1))
     if len(bad):
         raise FileError(f"{database.folder}, row {bad[0] + 1} of its entries: the position or heading is missing")

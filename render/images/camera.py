@@ -1,0 +1,212 @@
+"""A camera that sees all around: what its pictures are, and how panoramas are made of them."""
+
+import logging
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from tussock.world.errors import FileError, SettingError
+from tussock.world.settings import choice, number, settings, switch, whole
+
+from .lens_metadata import MAX_COLUMNS, MIN_ASPECT, natural_size
+from .metadata import read_storage
+from .pictures import Picture
+from .ring_search import find_ring
+from .unwrapping import LOOKING, MAX_PIXEL, MAX_SIZE, Fisheye, Omnidirectional, Panorama, Ring, Unwrapping
+
+log = logging.getLogger(__name__)
+
+LENSES = ("auto", "ring", "fisheye", "omnidirectional", "panorama", "equirectangular")
+TOP, BOTTOM = math.radians(60), math.radians(-15)  # as the published Sussex databases
+MATRICES = ("K", "camera_matrix", "cameramatrix", "intrinsic_matrix", "intrinsics", "mtx")
+DISTORTIONS = ("D", "distortion_coefficients", "dist_coeffs", "distcoeffs", "distortion", "dist")
+
+
+@settings
+class Camera:
+    """How panoramas are made of pictures. What is None is found out, stated by a calibration, or taken as usual.
+
+    Attributes:
+        lens: What the pictures are. auto: panoramas where they are at least twice as wide as high, rings otherwise.
+        calibration: File of OpenCV's with K and D of a fisheye lens, or xi, K and D of an omnidirectional one.
+        looking: What the middle of the picture of a calibrated lens shows.
+        centre: x and y of a ring (pixels).
+        inner: Radius of the inner circle of a ring (pixels).
+        outer: Radius of the outer circle of a ring (pixels).
+        offset: Where ahead is in the picture: clockwise from up, or to the right of the middle of a panorama (rad).
+        flip: The outer circle of a ring is the upper edge of the panorama.
+        mirrored: The picture is mirrored: clockwise in a ring, or to the right in a panorama, is to the left of the eye.
+        top: Elevation of the panorama's upper edge (rad); None is 60 degrees.
+        bottom: Elevation of its lower edge (rad); None is -15 degrees.
+        width: Columns of a panorama.
+        height: Rows of a panorama.
+    """
+
+    lens: str = choice("auto", LENSES)
+    calibration: Path | None = attrs.field(default=None)
+    looking: str = choice("up", LOOKING)
+    centre: tuple[float, ...] | None = attrs.field(default=None)
+    inner: float | None = number(None, low=0, high=MAX_PIXEL, unit="pixels", optional=True)
+    outer: float | None = number(None, above=0, high=MAX_PIXEL, unit="pixels", optional=True)
+    offset: float = number(0.0, low=-100, high=100, unit="rad")
+    flip: bool = switch(False)
+    mirrored: bool = switch(False)
+    top: float | None = number(None, low=-math.pi / 2, high=math.pi / 2, unit="rad", optional=True)
+    bottom: float | None = number(None, low=-math.pi / 2, high=math.pi / 2, unit="rad", optional=True)
+    width: int | None = whole(None, low=4, high=MAX_SIZE, unit="pixels", optional=True)
+    height: int | None = whole(None, low=1, high=MAX_SIZE, unit="pixels", optional=True)
+
+    def __attrs_post_init__(self):
+        if self.lens in ("fisheye", "omnidirectional") and self.calibration is None:
+            raise SettingError(
+                f"Camera: a {self.lens} lens needs a calibration; give the file of OpenCV's with K and D"
+            )
+        if self.calibration is not None and self.lens not in ("fisheye", "omnidirectional"):
+            raise SettingError(
+                f"Camera: a calibration is of a fisheye or omnidirectional lens, not of {self.lens!r}; give that lens"
+            )
+
+    def unwrapping(self, pictures: Sequence[Picture]) -> Unwrapping:
+        """How the pictures of this camera become panoramas. What is assumed is logged.
+
+        Args:
+            pictures: Some of its pictures, of one size, in which a ring is looked for.
+
+        Raises:
+            InputError: There is no ring in them, or what was given does not fit together.
+        """
+        height, width = pictures[0].shape[:2]
+        lens = self.lens
+        if lens == "auto":
+            lens = "panorama" if width >= MIN_ASPECT * height else "ring"
+            log.warning("the pictures are %d x %d: each is taken as a %s; --lens takes another", width, height, lens)
+        top, bottom = (usual if each is None else each for each, usual in ((self.top, TOP), (self.bottom, BOTTOM)))
+        if lens in ("ring", "panorama") and (self.top is None or self.bottom is None):
+            log.warning(
+                "the elevations of the %s's edges are not known: %g to %g degrees are assumed; --top-deg and --bottom-deg give others",
+                lens, round(math.degrees(bottom), 3), round(math.degrees(top), 3),
+            )  # fmt: skip
+        mapping = self._lens(lens, pictures, top, bottom)
+        usual = _usual_size(mapping, top, bottom)
+        across = self.width or usual[0]
+        return Unwrapping(mapping, across, self.height or max(1, round(usual[1] * across / usual[0])), top, bottom)
+
+    def _lens(
+        self, lens: str, pictures: Sequence[Picture], top: float, bottom: float
+    ) -> Ring | Panorama | Fisheye | Omnidirectional:
+        height, width = pictures[0].shape[:2]
+        turned: dict[str, Any] = {"offset": self.offset, "mirrored": self.mirrored}
+        if lens == "ring":
+            return self._ring(pictures, turned, top, bottom)
+        if lens == "panorama":
+            return Panorama(width=width, height=height, top=top, bottom=bottom, **turned)
+        if lens == "equirectangular":
+            if width != 2 * height:
+                log.warning("the pictures are %d x %d; an equirectangular one is twice as wide as high", width, height)
+            return Panorama(width=width, height=height, **turned)
+        assert self.calibration is not None
+        return read_calibration(self.calibration, lens, width, height, looking=self.looking, **turned)
+
+    def _ring(self, pictures: Sequence[Picture], turned: dict[str, Any], top: float, bottom: float) -> Ring:
+        centre, inner, outer = self.centre, self.inner, self.outer
+        if centre is None or inner is None or outer is None:
+            found = find_ring(pictures)
+            log.warning(
+                "found a ring with --centre %.1f,%.1f --inner-px %.1f --outer-px %.1f (%.0f %% of its edge seen)%s",
+                *found.centre, found.inner, found.outer, 100 * found.seen,
+                "; its centre is not dark, so that the inner radius may be larger" if inner is None and found.inner == 0 else "",
+            )  # fmt: skip
+            centre = found.centre if centre is None else centre
+            inner, outer = found.inner if inner is None else inner, found.outer if outer is None else outer
+        return Ring(centre=centre, inner=inner, outer=outer, flip=self.flip, top=top, bottom=bottom, **turned)
+
+
+def _usual_size(lens: Ring | Panorama | Fisheye | Omnidirectional, top: float, bottom: float) -> tuple[int, int]:
+    """Columns and rows of a panorama: of a panorama as it is, of other pictures not more than `MAX_COLUMNS`."""
+    if isinstance(lens, Ring):
+        return natural_size(lens)
+    if isinstance(lens, Panorama):
+        share = (top - bottom) / (lens.top - lens.bottom)
+        whole_sphere = share < 1
+        width = min(lens.width, MAX_COLUMNS) if whole_sphere else lens.width
+        return width, max(1, round(lens.height * share * width / lens.width))
+    return MAX_COLUMNS, max(1, round(MAX_COLUMNS * (top - bottom) / (2 * math.pi)))
+
+
+def read_calibration(path: Path, lens: str, width: int, height: int, **options: Any) -> Fisheye | Omnidirectional:
+    """Read the calibration of a lens.
+
+    Args:
+        path: YAML, JSON or XML, as OpenCV writes it, with K and D (or camera_matrix and distortion_coefficients), and xi.
+        lens: "fisheye" or "omnidirectional".
+        width: Of the pictures; K is scaled to it if the file states that it was calibrated at another size.
+        height: Of the pictures.
+        **options: Fields of the lens that the file does not have.
+
+    Raises:
+        FileError: It is not a calibration of this lens.
+    """
+    known = {key.lower(): value for key, value in _flat(read_storage(path)).items()}
+    matrix, distortion = (_matrix(known, names) for names in (MATRICES, DISTORTIONS))
+    if matrix is None or len(matrix) != 9:
+        raise FileError(f"{path} has no matrix K of 3 x 3 numbers; give the calibration of a {lens} lens")
+    distortion = distortion or [0.0] * 4
+    if len(distortion) < 4:
+        raise FileError(f"{path} has a distortion D of {len(distortion)} numbers; a {lens} lens has 4")
+    if len(distortion) > 4:
+        raise FileError(
+            f"{path} has a distortion D of {len(distortion)} numbers, as a lens of another kind; a {lens} lens has 4"
+        )
+    scale = _scale(known, width, height, path)
+    fx, skew, cx, _, fy, cy = matrix[:6]
+    numbers_of_k = (fx * scale, fy * scale, (cx + 0.5) * scale - 0.5, (cy + 0.5) * scale - 0.5, skew * scale)
+    try:
+        if lens == "fisheye":
+            return Fisheye(matrix=numbers_of_k, distortion=tuple(distortion), **options)
+        xi = _matrix(known, ("xi",))
+        if not xi:
+            raise FileError(f"{path} has no xi; give the calibration of an omnidirectional lens, or --lens fisheye")
+        return Omnidirectional(xi=xi[0], matrix=numbers_of_k, distortion=tuple(distortion), **options)
+    except SettingError as error:
+        raise FileError(f"{path} cannot be used as a calibration ({error})") from error
+
+
+def _flat(values: dict[str, Any]) -> dict[str, Any]:
+    """Values of nested groups under their own names; a matrix stays one."""
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, dict) and "data" not in value:
+            flat = _flat(value) | flat
+        else:
+            flat[key] = value
+    return flat
+
+
+def _matrix(known: dict[str, Any], names: Sequence[str]) -> list[float] | None:
+    """The numbers of a matrix, row by row, however it is written."""
+    for name in names:
+        value = known.get(name.lower())
+        value = value.get("data") if isinstance(value, dict) else value
+        rows = value if isinstance(value, list) else [value]
+        cells = [cell for row in rows for cell in (row if isinstance(row, list) else [row])]
+        found = [float(cell) for cell in cells if isinstance(cell, int | float) and math.isfinite(cell)]
+        if found and len(found) == len(cells):
+            return found
+    return None
+
+
+def _scale(known: dict[str, Any], width: int, height: int, path: Path) -> float:
+    """By how much the pictures are larger than those of the calibration."""
+    size = _matrix(known, ("image_size", "imagesize", "img_size", "resolution"))
+    calibrated = size or [*(_matrix(known, ("image_width",)) or []), *(_matrix(known, ("image_height",)) or [])]
+    if len(calibrated) != 2 or min(calibrated) <= 0:
+        return 1.0
+    scale = width / calibrated[0]
+    if abs(height / calibrated[1] - scale) > 0.01 * scale:
+        raise FileError(
+            f"{path} is of pictures of {calibrated[0]:g} x {calibrated[1]:g}, these are {width} x {height}; give its own calibration"
+        )
+    return scale

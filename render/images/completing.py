@@ -1,0 +1,111 @@
+"""Writing a database picture by picture, into a folder that can be completed after any interruption."""
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tussock.world.atomic import replacing
+from tussock.world.errors import FileError
+from tussock.world.progress import Progress
+
+from .database import make_folder
+from .entries import ENTRIES, FILENAME, Columns, read_entries, write_entries
+from .metadata import METADATA, read_metadata, write_metadata
+from .pictures import Picture, encoded
+
+BATCH = 64  # pictures that are made while those before them are encoded
+
+
+def start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
+    """Start a database in a new or empty folder, or resume the same one.
+
+    Args:
+        folder: The folder.
+        metadata: Of the database. All under `tussock`, and `type`, must be the same to resume.
+
+    Raises:
+        FileError: The folder holds anything else.
+    """
+    if (folder / METADATA).is_file():
+        theirs = read_metadata(folder / METADATA)
+        for name, value in {"type": metadata["type"], **metadata["tussock"]}.items():
+            group = theirs if name == "type" else theirs.get("tussock")
+            if not isinstance(group, dict) or group.get(name) != value:
+                raise FileError(f"{folder} holds an image database that differs in its {name}; give another folder")
+    elif folder.exists() and (not folder.is_dir() or set(folder.iterdir()) - set(_partial_files(folder))):
+        raise FileError(f"{folder} exists already and is not an image database; give a new folder")
+    else:
+        make_folder(folder)
+        write_metadata(folder / METADATA, metadata)
+
+
+def missing_rows(folder: Path, columns: Columns) -> list[int]:
+    """Rows that are not in the entries of the folder, or whose image is missing. Raises FileError if the entries have other columns."""
+    listed = set()
+    if (folder / ENTRIES).is_file():
+        theirs = read_entries(folder / ENTRIES).columns
+        if list(theirs) != list(columns):
+            raise FileError(f"{folder / ENTRIES} was changed since it was written; give another folder")
+        listed = set(zip(*theirs.values(), strict=True))
+    rows = zip(*columns.values(), strict=True)
+    images = {path.name for path in folder.glob("image_*")}
+    return [i for i, row in enumerate(rows) if row not in listed or columns[FILENAME][i] not in images]
+
+
+def complete(
+    folder: Path,
+    columns: Columns,
+    missing: list[int],
+    make: Callable[[list[int]], Iterable[Picture]],
+    progress: Progress,
+    quality: int = 80,
+) -> None:
+    """Make the images of the missing rows. The entries list each batch when all of its images are saved.
+
+    Args:
+        folder: A folder that `start_or_resume` has made.
+        columns: Entries of the complete database.
+        missing: Rows to make, in this order.
+        make: Makes the pictures of some rows.
+        progress: Called now and then with the number of images that are done, and of all.
+        quality: Of JPEG images.
+    """
+    for path in _partial_files(folder):
+        path.unlink(missing_ok=True)
+    done = np.ones(len(columns[FILENAME]), dtype=bool)
+    done[missing] = False
+
+    def finish(rows: list[int], saving: list[Future]) -> None:
+        for image in saving:
+            image.result()
+        done[rows] = True
+        listed = np.flatnonzero(done).tolist()
+        write_entries(folder / ENTRIES, {name: tuple(cells[i] for i in listed) for name, cells in columns.items()})
+        progress(len(listed), len(done))
+
+    if not missing:
+        return
+    with ThreadPoolExecutor() as pool:
+        before: tuple[list[int], list[Future]] = ([], [])
+        for start in range(0, len(missing), BATCH):
+            rows = missing[start : start + BATCH]
+            pictures = make(rows)
+            finish(*before)
+            paths = [folder / columns[FILENAME][row] for row in rows]
+            saving = [pool.submit(_save, path, each, quality) for path, each in zip(paths, pictures, strict=True)]
+            before = rows, saving
+        finish(*before)
+
+
+def _partial_files(folder: Path) -> list[Path]:
+    """The temporary files of a call that was killed."""
+    return [*folder.glob(".image_*.partial.*"), *folder.glob(".database_*.partial.*")]
+
+
+def _save(path: Path, picture: Picture, quality: int) -> None:
+    with replacing(path) as partial:
+        partial.write_bytes(encoded(picture, os.path.splitext(path)[1], quality))
