@@ -112,6 +112,7 @@ class Experiment(Surroundings):
     device: str = attrs.field(default="cpu")
 
     def __attrs_post_init__(self):
+        from .feature_mask import WITH_MASK
         from .models.base import FamiliarityModel
         from .models.checks import check_device
         from .steering.navigator import Navigator
@@ -127,6 +128,10 @@ class Experiment(Surroundings):
             if not isinstance(self.navigator.make(model=model), Navigator):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
+                )
+            if self.encoding.for_eye(self.eye).mask is not None and not takes(self.navigator.target, "model"):
+                raise SettingError(
+                    f"the navigator {str(self.navigator)!r} takes no model, so it does not know what the eye sees; {WITH_MASK}"
                 )
         elif not takes(self.navigator.target, "model"):
             raise SettingError(
@@ -147,10 +152,12 @@ class Experiment(Surroundings):
         return attrs.evolve(changed, encoding=encoding)
 
     def make_model(self) -> "FamiliarityModel":
-        """The untrained model. Raises SettingError where it comes from a file."""
+        """The untrained model, told what the eye sees. Raises SettingError where it comes from a file."""
+        from .feature_mask import seeing
+
         if isinstance(self.model, Path):
             raise SettingError(f"{self.model} is a trained model; give a model's name")
-        return self.model.make(seed=self.seed, device=self.device)
+        return seeing(self.model.make(seed=self.seed, device=self.device), self.encoding.for_eye(self.eye).mask)
 
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
@@ -167,6 +174,7 @@ class Experiment(Surroundings):
             progress: Called with how many training views are drawn, of how many.
             model: An untrained model to take in place of the experiment's.
         """
+        from .feature_mask import seeing
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
@@ -180,7 +188,8 @@ class Experiment(Surroundings):
                 navigator = self.navigator.make(model=loaded.model)
                 poses = loaded.poses
             else:
-                navigator = self.navigator.make(model=self.make_model() if model is None else model)
+                untrained = self.make_model() if model is None else seeing(model, self.encoding.for_eye(self.eye).mask)
+                navigator = self.navigator.make(model=untrained)
                 wanted = self.training_poses(renderer.world, route)
                 views, poses = training_views(self.encoding, renderer, wanted, progress)
                 navigator.learn(views)

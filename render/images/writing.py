@@ -7,7 +7,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import attrs
 import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -18,6 +17,7 @@ from tussock.world.geometry import Bounds
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
 
+from ..eye import Eye
 from ..poses import Poses
 from ..renderer import Renderer
 from .database import Database, make_folder, read_database
@@ -39,6 +39,7 @@ from .metadata import METADATA, read_metadata, write_metadata
 
 BATCH = 64  # views that are rendered while those before them are encoded
 MAX_VIEWS = 10**6  # of a grid
+MASK_PIECE = 2000  # bytes
 MIN_SPACING = 0.001  # m, because the names of images have whole millimetres
 
 
@@ -166,7 +167,7 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
         "world": hashlib.sha256(scene).hexdigest(),
         "poses": hashlib.sha256(poses.tobytes()).hexdigest(),
         "views": len(poses),
-        "eye": attrs.asdict(eye) | {"samples": eye.rays},
+        "eye": _plain(eye),
     }
     kind = "route" if grid is None else "grid"
     metadata: dict[str, Any] = {"time": time.strftime("%Y-%m-%d %H:%M:%S"), "type": kind}
@@ -175,6 +176,14 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
         metadata["grid"] = {"beginAtMM": begin, "separationMM": [spacing, spacing, 0.0], "size": [*grid.size, 1]}
     camera = {"name": "tussock", "resolution": [eye.width, eye.height], "isPanoramic": 0}
     return metadata | {"camera": camera, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": tussock}
+
+
+def _plain(eye: Eye) -> dict[str, Any]:
+    """The fields of an eye as the metadata holds them: OpenCV reads no text of over 4096 bytes, so that of a mask is cut to pieces."""
+    fields = eye.plain() | {"samples": eye.rays}
+    if eye.mask is None:
+        return fields
+    return fields | {"mask": [eye.mask[start : start + MASK_PIECE] for start in range(0, len(eye.mask), MASK_PIECE)]}
 
 
 def _start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
