@@ -48,14 +48,7 @@ class EncodingStep(ABC):
         return low, high
 
     def visible(self, mask: Visible) -> Visible:
-        """Which pixels after this step depend on visible pixels alone.
-
-        Args:
-            mask: (rows, columns) The visible pixels before it.
-
-        Raises:
-            SettingError: Where each pixel depends on the whole image, or it is not known on which.
-        """
+        """Which pixels after this step depend on visible ones (rows, columns) alone. Raises SettingError where that is not known."""
         raise SettingError(
             f"{self.name or type(self).__name__} makes each pixel of hidden ones too, so it cannot be used with a field or mask; "
             "leave it out, or give it a method visible(mask)"

@@ -112,7 +112,6 @@ class Experiment(Surroundings):
     device: str = attrs.field(default="cpu")
 
     def __attrs_post_init__(self):
-        from .feature_mask import WITH_MASK
         from .models.base import FamiliarityModel
         from .models.checks import check_device
         from .steering.navigator import Navigator
@@ -129,9 +128,9 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
-            if self.encoding.for_eye(self.eye).mask is not None and not takes(self.navigator.target, "model"):
+            if self.eye.masked and not takes(self.navigator.target, "model"):
                 raise SettingError(
-                    f"the navigator {str(self.navigator)!r} takes no model, so it does not know what the eye sees; {WITH_MASK}"
+                    f"the navigator {str(self.navigator)!r} takes no model; give an eye without field or mask"
                 )
         elif not takes(self.navigator.target, "model"):
             raise SettingError(
@@ -172,9 +171,8 @@ class Experiment(Surroundings):
             renderer: Of the world, for the experiment's eye.
             route: Through it.
             progress: Called with how many training views are drawn, of how many.
-            model: An untrained model to take in place of the experiment's.
+            model: An untrained model to take in place of the experiment's, told what the eye sees.
         """
-        from .feature_mask import seeing
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
@@ -188,8 +186,7 @@ class Experiment(Surroundings):
                 navigator = self.navigator.make(model=loaded.model)
                 poses = loaded.poses
             else:
-                untrained = self.make_model() if model is None else seeing(model, self.encoding.for_eye(self.eye).mask)
-                navigator = self.navigator.make(model=untrained)
+                navigator = self.navigator.make(model=self.make_model() if model is None else model)
                 wanted = self.training_poses(renderer.world, route)
                 views, poses = training_views(self.encoding, renderer, wanted, progress)
                 navigator.learn(views)

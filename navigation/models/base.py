@@ -138,15 +138,8 @@ class Model(ABC):
         return format_spec(MODELS.name_of(type(self)), changed)
 
     def see(self: Self, mask: FeatureMask | None) -> Self:
-        """Say, before training, what the eye sees of each view at any rotation.
-
-        Views are of the full circle all the same, for training and scanning: they turn behind the mask.
-
-        Args:
-            mask: As `Encoding.for_eye(eye).mask` has it; None means everything.
-
-        Raises:
-            SettingError: After training, and for a class that does not mind masks.
+        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Views are of the full circle all the same, and turn
+        behind it. Raises SettingError after training, and for a class that does not mind masks.
         """
         if self.shape is not None and mask != self.mask:
             raise SettingError(f"{self.name} has learned through another mask; make a new model")
