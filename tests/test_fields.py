@@ -1,23 +1,36 @@
 """Fields of view and masks: each model, encoding and command against hiding pixels of the turned view, one rotation after the other."""
 
+import dataclasses
+import json
 import math
 from functools import cache
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import torch
-from scenes import random_poses, random_world, views
+from scenes import random_poses, random_world, views, world_of
 from small_models import small
 
+from tussock.navigation.cli.main import main
 from tussock.navigation.encoding import PRESETS, Encoding
+from tussock.navigation.encoding_steps import EncodingStep
+from tussock.navigation.experiment import Experiment
 from tussock.navigation.feature_mask import FeatureMask
 from tussock.navigation.models import MODELS, OPPONENT, PerfectMemory, make_model
 from tussock.navigation.models.base import Model
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.models.mushroom_body import receptive_fields
+from tussock.navigation.stopping import StopReason
 from tussock.render.eye import Eye
+from tussock.render.images.entries import stored_poses
+from tussock.render.images.metadata import METADATA, read_metadata
+from tussock.render.images.writing import write_database
+from tussock.render.occlusion import covered_within
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import FileError, SettingError
+from tussock.world.geometry import Pose
 
 NAMES = [*MODELS.builtin, *(OPPONENT + name for name in ("perfect-memory", "mlp", "mushroom-body", "random"))]
 TURNING = {"mlp", "mlp-rotation", "mlp-mixture", "adaboost"}  # they learn turned copies of their views too
@@ -224,6 +237,128 @@ def test_a_mask_is_told_before_training_and_to_models_that_mind_it():
         assert make_model(name).takes_mask
 
 
+class Blank(EncodingStep):
+    """The trap: columns outside of a field are blanked in the view, and turn with it."""
+
+    def __init__(self, degrees: float):
+        self.eye = {"height": 1, "field": math.radians(degrees)}
+
+    def __call__(self, images):
+        return images * Eye(width=images.shape[2], **self.eye).visible()[0]
+
+
+@pytest.mark.parametrize("degrees", [270, 180, 90])
+def test_a_turned_view_is_recognised_through_a_field_and_not_after_blanking(panoramas, degrees):
+    field = Eye(width=120, height=30, field=math.radians(degrees))
+    chain = Encoding.named("edges")
+    blanking = Encoding((*chain.steps[:-1], Blank(degrees), chain.steps[-1]))
+    encoded = chain.for_eye(field)
+    memory, trapped = (
+        PerfectMemory().see(encoded.mask).fit(encoded(panoramas)),
+        PerfectMemory().fit(blanking(panoramas)),
+    )
+    for k in (30, 60, 90):  # the agent faces another way: it has to turn by k columns
+        turned = np.roll(panoramas, -k, axis=2)
+        assert memory.scan(encoded(turned)).argmax(dim=1).tolist() == [k] * 3
+        if k == 60 and degrees < 270:  # of what it learned it sees nothing now, if it is blank that turns
+            assert k not in trapped.scan(blanking(turned)).argmax(dim=1).tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [270, 180, 90])
+def test_a_walk_arrives_with_a_field_of_view_and_gets_lost_by_blanking(degrees):
+    def walk(field: float, encoding: Encoding):
+        return Experiment(
+            world="meadow",
+            seed=1,
+            route_length=4.0,
+            eye=Eye(width=180, height=40, field=math.radians(field)),
+            encoding=encoding,
+            start_offset=0.1,
+            renderer="cpu",
+        ).run()
+
+    chain = Encoding.named("edges", resize=3)
+    assert walk(degrees, chain).summary()["reason"] == "arrived"
+    assert walk(360, Encoding((*chain.steps[:-1], Blank(degrees), chain.steps[-1]))).summary()["reason"] == "lost"
+
+
+# What is built on them
+
+TINY = {"world": "tiny", "seed": 3, "route_length": 1.0, "eye": Eye(width=60, height=15, field=math.radians(200))}
+
+
+def test_failures_are_diagnosed_behind_a_mask():
+    experiment = Experiment(**TINY, model="infomax", encoding="edges", start_offset=0.3)
+    with experiment.opened() as trained:
+        examined = [trained.diagnostics.examine(step) for step, _ in experiment.steps(trained)]
+        step, _ = next(experiment.steps(trained))
+        failed = dataclasses.replace(step, failure=StopReason.LOST)
+        diagnosis = trained.diagnostics.examine(failed)
+    assert examined
+    assert diagnosis.recognised is not None
+    assert diagnosis.nearest is not None
+
+
+def test_what_is_close_behind_the_eye_does_not_cover_its_view():
+    wall = np.array([[[-0.02, -9, -9], [-0.02, 9, -9], [-0.02, 0, 9]]])  # west of the eye
+    world, field = world_of(wall, np.zeros((1, 3))), {"width": 72, "height": 30}
+    east, west = Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, math.pi)
+    whole = covered_within(world, Eye(**field), east, 0.05)
+    assert covered_within(world, Eye(**field, field=math.pi), east, 0.05) == 0
+    assert covered_within(world, Eye(**field, field=math.pi), west, 0.05) == pytest.approx(2 * whole)
+
+
+def test_a_recording_a_view_and_an_observation_show_what_is_visible(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    visible = TINY["eye"].visible()
+    flags = ["--world", "tiny", "--seed", "3", "--size", "60x15", "--field-deg", "200"]
+    main(["view", *flags, "--alpha"])
+    image = cv2.imread("view.png", cv2.IMREAD_UNCHANGED)
+    assert not image[~visible].any()
+    assert image[visible].any(axis=1).all()
+    gymnasium = pytest.importorskip("gymnasium")
+    name = "tussock.navigation.rl.environment:tussock/RouteFollowing-v0"
+    task = {"world": "tiny", "world_seed": 3, "length": 1.0, "eye": TINY["eye"], "renderer": "cpu"}
+    for encoding in (None, "foreground-mask | vertical-edges | normalise"):
+        with gymnasium.make(name, encoding=encoding, render_mode="rgb_array", **task) as env:
+            seen, _ = env.reset(seed=1)
+            assert env.observation_space.contains(seen)
+            assert not seen[~visible].any()
+            assert seen[visible].any()
+            assert not env.render()[~visible.repeat(12, axis=0).repeat(12, axis=1)].any()
+            learned, _ = env.unwrapped.training_views()
+            assert not learned[:, ~visible].any()
+
+
+def test_a_run_with_a_field_is_recorded_and_repeats(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    cv2.imwrite("mask.png", np.where(irregular(15, 60), 255, 0).astype(np.uint8))
+    walk = ["--world", "tiny", "--seed", "3", "--route-length-m", "1"]
+    flags = [*walk, "--size", "60x15", "--resize", "1", "--mask", "mask.png"]
+    main(["train", *flags, "--field-deg", "300", "--learning-walk-m", "0.2", "--out", "model.safetensors"])
+    main(["run", *flags, "--field-deg", "300", "--learning-walk-m", "0.2", "--out", "one"])
+    Path("mask.png").unlink()  # the file of the model keeps it
+    main(["run", *walk, "--model", "model.safetensors", "--out", "two"])
+    one, two = (Path(run, "trajectory.csv").read_text() for run in ("one", "two"))
+    assert one == two
+    settings = json.loads(Path("two", "summary.json").read_text())["settings"]
+    assert settings["field_deg"] == 300.0
+    assert settings["mask"].startswith("60x15:")
+
+
+def test_a_database_keeps_the_eye_and_whole_panoramas(tmp_path):
+    visible = np.random.default_rng(0).random((100, 700)) > 0.5  # a text longer than OpenCV reads at once
+    eye = Eye(width=700, height=100, mask=visible, field=math.pi)
+    with open_renderer(random_world(), eye, "cpu") as renderer:
+        database, _ = write_database(tmp_path / "database", renderer, random_poses(2))
+        assert write_database(tmp_path / "database", renderer, random_poses(2))[1] == 0
+        views = renderer.render(stored_poses(random_poses(2)))
+    kept = read_metadata(tmp_path / "database" / METADATA)["tussock"]["eye"]
+    assert Eye(**kept | {"samples": None}) == eye
+    assert (database.views()[0] == views[0]).all()
+
+
 # Encodings
 
 CHAINS = [
@@ -322,8 +457,6 @@ def test_columns_that_are_partly_outside_of_the_field_are_hidden():
 
 
 def test_masks_are_equal_by_their_pixels(tmp_path):
-    import cv2
-
     visible = irregular(30, 120)
     cv2.imwrite(str(tmp_path / "mask.png"), visible.astype(np.uint8) * 255)
     eye, other = Eye(width=120, height=30, mask=visible), Eye(width=120, height=30, mask=tmp_path / "mask.png")
@@ -340,8 +473,6 @@ def test_masks_are_equal_by_their_pixels(tmp_path):
 
 
 def test_a_pixel_of_a_smaller_eye_sees_where_all_of_the_picture_does(tmp_path):
-    import cv2
-
     picture = np.full((60, 240), 255, np.uint8)
     picture[7, 100] = 0
     picture[30:, 200:] = 100

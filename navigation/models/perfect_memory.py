@@ -53,7 +53,8 @@ class PerfectMemory(IncrementalModel):
 
     def _prepare(self) -> None:
         if self.mask is not None:
-            self._banks = [self._bank(block) for block in self.snapshots.split(FILTERS)]
+            blocks = self.snapshots.split(FILTERS)
+            self._banks = [(self._bank(block), energies(block.double(), None)[:, 0]) for block in blocks]
             return
         # The distance does not change when a constant is taken from all pixels; float32 keeps more digits of it around 0.
         self._level = float(self.snapshots.mean(dtype=torch.float64))
@@ -81,12 +82,11 @@ class PerfectMemory(IncrementalModel):
 
     def _nearest_seen(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """The same behind a mask: what is seen of a view, and so its |v|^2, differs from rotation to rotation."""
-        of_snapshots = energies(self.snapshots.double(), None)[:, 0].split(FILTERS)
         compared = torch.zeros(len(self.snapshots), dtype=torch.bool, device=views.device)
         compared[among] = True
         of_views = energies(views, self.mask)
         least, index = torch.full_like(of_views, torch.inf), torch.zeros_like(of_views, dtype=torch.int64)
-        for k, (bank, squares, some) in enumerate(zip(self._banks, of_snapshots, compared.split(FILTERS), strict=True)):
+        for k, ((bank, squares), some) in enumerate(zip(self._banks, compared.split(FILTERS), strict=True)):
             distances = (squares - 2 * bank.exact(views)).where(some, torch.inf)
             values, which = distances.min(dim=2)
             index = (which + k * FILTERS).where(values < least, index)
