@@ -68,13 +68,13 @@ def compare_models(
     route_views, poses = route.resampled(experiment.training.spacing), facing_east(positions)
     views = list(encoded_views(encoding, renderer, poses))
     for spec in models:
-        model = spec.make(seed=experiment.seed, device=experiment.device)
+        model = experiment.replace(model=spec).make_model()
         began = time.perf_counter()
         model.fit(views_on_route)
         fitted = time.perf_counter()
         errors = errors_of_views(model, views, route_views, poses)
         scanned = time.perf_counter()
-        navigator = experiment.navigator.make(model=spec.make(seed=experiment.seed, device=experiment.device))
+        navigator = experiment.navigator.make(model=experiment.replace(model=spec).make_model())
         navigator.learn(views_around)
         *_, (last,) = experiment.walk(renderer, route).steps(navigator)
         yield Comparison(

@@ -17,7 +17,8 @@ from tussock.world.registry import Registry
 from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
-from .encoding_steps import Blur, EncodingStep, Images, Normalise, Resize, Views
+from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views
+from .feature_mask import FeatureMask
 
 STEPS = Registry(
     "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
@@ -78,6 +79,34 @@ class Encoding:
             low, high = step.bounds(low, high, images.size) if isinstance(step, EncodingStep) else unknown
         return (images.shape[1], images.shape[2]), low, high
 
+    def for_eye(self, eye: Eye) -> "EyeEncoding":
+        """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
+        visible = eye.visible() if eye.masked else np.ones((1, 1), dtype=bool)
+        if visible.all():
+            return EyeEncoding(self, None)
+        at = next((place for place, step in enumerate(self.steps) if isinstance(step, Normalise)), len(self.steps))
+        local, rest = self.steps[:at], self.steps[at + 1 :]
+        for step in rest:
+            if not isinstance(step, Scale):
+                raise SettingError(
+                    f"encoding {str(self)!r}: with a field or mask, normalise takes what is visible at each heading, so it stands last, "
+                    f"or before scale only; put {label(step)} before it"
+                )
+        for step in local:
+            check = getattr(step, "visible", None)
+            if check is None:
+                raise SettingError(
+                    f"encoding {str(self)!r}: {label(step)} lacks visible(mask), which a field or mask needs"
+                )
+            visible = check(visible)
+        if not visible.any():
+            raise SettingError(
+                f"encoding {str(self)!r} leaves no pixel that is made of visible ones alone; give less blur or resize, or a wider field"
+            )
+        gain = float(np.prod([step.factor for step in rest if isinstance(step, Scale)]))
+        mask = FeatureMask(torch.from_numpy(visible), normalised=at < len(self.steps), gain=gain)
+        return EyeEncoding(attrs.evolve(self, steps=local), mask)
+
     def __str__(self) -> str:
         return self._text(STEPS.name_of)
 
@@ -128,6 +157,37 @@ class Encoding:
         if resize != 1 or blur != 0:
             raise SettingError(f"encoding {name!r} is a chain in full: put resize and blur into it")
         return cls.parse(name)
+
+
+@attrs.frozen
+class EyeEncoding:
+    """An encoding for the views of one eye.
+
+    With a field of view or a mask it encodes the full circle, and leaves it to the model to hide what the eye does not see at each
+    rotation, and to normalise what it sees (`Model.see`).
+
+    Attributes:
+        encoding: What is made of the full circle.
+        mask: What of it the model sees; None where nothing is hidden.
+    """
+
+    encoding: Encoding
+    mask: FeatureMask | None
+
+    def __call__(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
+        """Feature images of the full circle."""
+        estimates = views.shape[-1] == 3 and isinstance(self.encoding.steps[0], ForegroundMask)
+        if self.mask is not None and estimates:
+            raise SettingError(
+                "foreground-mask estimates the sky from the whole view, hidden parts too; with a field or mask give views with alpha, or "
+                "take grey"
+            )
+        return self.encoding(views)
+
+    def seen(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
+        """Feature images as the eye sees them at its present heading, 0 where it sees nothing: not to be turned."""
+        images = self(views)
+        return images if self.mask is None else self.mask.images(images)
 
 
 def label(step: Any) -> str:

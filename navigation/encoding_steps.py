@@ -10,13 +10,14 @@ from typing import ClassVar
 import attrs
 import cv2
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Bool, Float32, UInt8
 
 from tussock.world.errors import SettingError
 from tussock.world.settings import number
 
 Views = UInt8[np.ndarray, "n height width channels"]
 Images = Float32[np.ndarray, "n h w"]
+Visible = Bool[np.ndarray, "_ _"]
 
 
 class EncodingStep(ABC):
@@ -46,9 +47,32 @@ class EncodingStep(ABC):
         """
         return low, high
 
+    def visible(self, mask: Visible) -> Visible:
+        """Which pixels after this step depend on visible ones (rows, columns) alone. Raises SettingError where that is not known."""
+        raise SettingError(
+            f"{self.name or type(self).__name__} makes each pixel of hidden ones too, so it cannot be used with a field or mask; "
+            "leave it out, or give it a method visible(mask)"
+        )
+
+
+class PixelStep(EncodingStep):
+    """A step that makes each pixel of the one pixel in its place."""
+
+    def visible(self, mask: Visible) -> Visible:
+        """The same pixels."""
+        return mask
+
+
+class AveragingStep(EncodingStep):
+    """A step whose pixels are sums of other ones with weights that are not negative."""
+
+    def visible(self, mask: Visible) -> Visible:
+        """Those pixels to which no hidden one adds anything."""
+        return self((~mask)[None].astype(np.float32))[0] == 0
+
 
 @attrs.frozen
-class Grey(EncodingStep):
+class Grey(PixelStep):
     """Brightness, 0..1 (ITU-R BT.601 weights, as OpenCV converts)."""
 
     name: ClassVar[str] = "grey"
@@ -60,7 +84,7 @@ class Grey(EncodingStep):
 
 
 @attrs.frozen
-class ForegroundMask(EncodingStep):
+class ForegroundMask(PixelStep):
     """Share of each pixel that is not open sky, 0..1: exact where views have alpha, else estimated from their colours.
 
     The estimate takes the median colour of the top rows as the sky, and Otsu's threshold on the distance from it.
@@ -82,7 +106,7 @@ class ForegroundMask(EncodingStep):
 
 
 @attrs.frozen
-class Blur(EncodingStep):
+class Blur(AveragingStep):
     """Gaussian smoothing; around the ring, mirrored at top and bottom.
 
     Attributes:
@@ -101,7 +125,7 @@ class Blur(EncodingStep):
 
 
 @attrs.frozen
-class Resize(EncodingStep):
+class Resize(AveragingStep):
     """Area average down to 1 / `factor` of the width and height (rounded, at least 4 x 1)."""
 
     name: ClassVar[str] = "resize"
@@ -118,7 +142,7 @@ class Resize(EncodingStep):
 
 
 @attrs.frozen
-class Sample(EncodingStep):
+class Sample(AveragingStep):
     """Bilinear samples `factor` pixels apart without averaging: fine structure aliases, as in cv2.resize by default.
 
     The thesis resized its views so. Width and height as with `Resize`.
@@ -135,7 +159,7 @@ class Sample(EncodingStep):
 
 
 @attrs.frozen
-class Invert(EncodingStep):
+class Invert(PixelStep):
     """Bright becomes dark: 1 minus each value."""
 
     name: ClassVar[str] = "invert"
@@ -190,7 +214,7 @@ class Clahe(EncodingStep):
 
 
 @attrs.frozen
-class Widen(EncodingStep):
+class Widen(AveragingStep):
     """Each pixel averaged with its neighbours to the right: pixels become `columns` wide, and there is still one per column.
 
     So a view of coarse pixels can be turned by less than one of them.
@@ -210,7 +234,7 @@ class Widen(EncodingStep):
 
 
 @attrs.frozen
-class Scale(EncodingStep):
+class Scale(PixelStep):
     """Each value times `factor`: less contrast, for models whose learning rate needs it."""
 
     name: ClassVar[str] = "scale"
@@ -231,6 +255,10 @@ class VerticalEdges(EncodingStep):
 
     def __call__(self, images: Images) -> Images:
         return np.abs(np.roll(images, -1, axis=-1) - images)
+
+    def visible(self, mask: Visible) -> Visible:
+        """Those that are visible together with their neighbours to the right."""
+        return mask & np.roll(mask, -1, axis=-1)
 
     def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
         return 0.0, high - low

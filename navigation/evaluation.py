@@ -94,9 +94,10 @@ def facing_east(positions: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]
 def encoded_views(
     encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"]
 ) -> Iterator[Float32[torch.Tensor, "m h w"]]:
-    """The encoded views at poses, in batches."""
+    """The encoded views at poses, in batches; of the full circle, whatever the eye sees of it (see `Encoding.for_eye`)."""
+    encoded = encoding.for_eye(renderer.eye)
     for start in range(0, len(poses), BATCH):
-        yield encoding(renderer.render(poses[start : start + BATCH]))
+        yield encoded(renderer.render(poses[start : start + BATCH]))
 
 
 def recovered_headings(

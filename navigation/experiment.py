@@ -128,6 +128,10 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
+            if self.eye.masked and not takes(self.navigator.target, "model"):
+                raise SettingError(
+                    f"the navigator {str(self.navigator)!r} takes no model; give an eye without field or mask"
+                )
         elif not takes(self.navigator.target, "model"):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"
@@ -147,10 +151,12 @@ class Experiment(Surroundings):
         return attrs.evolve(changed, encoding=encoding)
 
     def make_model(self) -> "FamiliarityModel":
-        """The untrained model. Raises SettingError where it comes from a file."""
+        """The untrained model, told what the eye sees. Raises SettingError where it comes from a file."""
+        from .feature_mask import seeing
+
         if isinstance(self.model, Path):
             raise SettingError(f"{self.model} is a trained model; give a model's name")
-        return self.model.make(seed=self.seed, device=self.device)
+        return seeing(self.model.make(seed=self.seed, device=self.device), self.encoding.for_eye(self.eye).mask)
 
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
@@ -165,7 +171,7 @@ class Experiment(Surroundings):
             renderer: Of the world, for the experiment's eye.
             route: Through it.
             progress: Called with how many training views are drawn, of how many.
-            model: An untrained model to take in place of the experiment's.
+            model: An untrained model to take in place of the experiment's, told what the eye sees.
         """
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model

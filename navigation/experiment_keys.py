@@ -62,6 +62,8 @@ def _digest(experiment: Experiment, names: Collection[str]) -> str:
         kept["encoding"] = experiment.encoding.text_in_files()
         kept["model"] = content_of(model) if isinstance(model, Path) else _in_files(model, MODELS)
         kept["navigator"] = _in_files(experiment.navigator, NAVIGATORS)
+    if "mask" in names and experiment.eye.mask is not None:
+        kept["mask"] = str(experiment.eye.mask)  # its pixels, wherever they were read from
     if experiment.route is not None:
         kept |= {"route": content_of(experiment.route), "route_seed": None, "route_length_m": None}
     if not (isinstance(experiment.world, str) and is_generated(experiment.world)):

@@ -38,7 +38,8 @@ TYPES: dict[str, Any] = {
     "world": str, "world_seed": int | None, "up": str, "unit": str, "scale": float | None, "strict": bool,
     "ground": str, "max_slope_deg": float,
     "seed": int, "size": str | None, "renderer": str, "samples": int | None,
-    "eye_height_m": float, "top_deg": float, "bottom_deg": float, "cull_back_faces": bool, "route": Path | None,
+    "eye_height_m": float, "top_deg": float, "bottom_deg": float, "field_deg": float | None, "mask": str | None,
+    "cull_back_faces": bool, "route": Path | None,
     "route_seed": int | None, "route_length_m": float, "headings": str, "columns": str | None, "smooth_m": float,
     "encoding": str | None, "resize": float | None, "blur": float,
     "spacing_m": float, "every": int, "learning_walk_m": float, "device": str, "model": str, "threads": int | None, "step_m": float,
@@ -103,6 +104,8 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "eye_height_m": eye.z,
         "top_deg": degrees(eye.top),
         "bottom_deg": degrees(eye.bottom),
+        "field_deg": degrees(eye.field),
+        "mask": None if eye.mask is None else eye.mask.source or str(eye.mask),
         "cull_back_faces": experiment.cull_back_faces,
         "route": None if experiment.route is None else _source(experiment.route, "route"),
         "route_seed": experiment.route_seed,
@@ -210,11 +213,14 @@ def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]
 def _eye(given: Mapping[str, Any], known: Eye | None) -> Eye:
     size = given.get("size") or (f"{known.width}x{known.height}" if known is not None else None)
     pixels = {} if size is None else dict(zip(("width", "height"), width_and_height(size), strict=True))
-    eye = Eye(**pixels, **_values(given, samples="samples", z="eye_height_m", top="top_deg", bottom="bottom_deg"))
+    seen = {} if known is None else {"field": known.field, "mask": known.mask}
+    seen |= _values(given, field="field_deg", mask="mask")
+    names = {"samples": "samples", "z": "eye_height_m", "top": "top_deg", "bottom": "bottom_deg"}
+    eye = Eye(**pixels, **_values(given, **names), **seen)
     if known is not None and eye != known:
         raise SettingError(
             f"{given['model']} learned through another eye ({known}) than is asked for ({eye}); "
-            "give the same --size, --samples, --eye-height-m, --top-deg and --bottom-deg, or none"
+            "give the same --size, --samples, --eye-height-m, --top-deg, --bottom-deg, --field-deg and --mask, or none"
         )
     return eye
 

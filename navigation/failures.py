@@ -146,7 +146,7 @@ class Diagnostics:
             if step.view is None:
                 return None
             memory, poses = self._memory
-            _, index = memory.match(encoding(step.view[None]))
+            _, index = memory.match(encoding.for_eye(self._renderer.eye)(step.view[None]))
             width = index.shape[1]
             match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
         return float(np.hypot(*(poses[match, :2] - step.pose[:2])))
@@ -157,7 +157,7 @@ class Diagnostics:
         assert self._learned is not None
         encoding, poses = self._learned
         views, poses = training_views(encoding, self._renderer, poses)
-        return PerfectMemory().fit(views), poses
+        return PerfectMemory().see(encoding.for_eye(self._renderer.eye).mask).fit(views), poses
 
 
 def walk_cause(along: Sequence[float], causes: Sequence[str], failed: Sequence[bool]) -> str | None:

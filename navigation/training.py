@@ -10,6 +10,7 @@ from tussock.world.geometry import Bounds, Route, wrap_angle
 from tussock.world.progress import Progress, no_progress
 
 from .encoding import Encoding
+from .feature_mask import seeing
 from .models.base import FamiliarityModel
 from .models.files import TrainedModel
 
@@ -68,6 +69,9 @@ def training_views(
     A view without contrast is left out, as where a plant covers the eye: it holds nothing to recognise, yet after normalising it lies
     nearer to every view than most true matches do.
 
+    Where the eye does not see all around, the views are of the full circle all the same: a model must `see` the mask of
+    `encoding.for_eye(renderer.eye)` before it learns them.
+
     Args:
         encoding: What is kept of a view.
         renderer: Draws the views.
@@ -78,12 +82,14 @@ def training_views(
         SettingError: Where no view is left.
     """
     images, kept = [], []
+    encoded = encoding.for_eye(renderer.eye)
     for start in range(0, len(poses), BATCH):
         part = poses[start : start + BATCH]
-        batch = encoding(renderer.render(part))
-        visible = batch.flatten(start_dim=1).std(dim=1, correction=0) > MIN_CONTRAST
-        images.append(batch[visible])
-        kept.append(part[visible.numpy()])
+        batch = encoded(renderer.render(part))
+        pixels = batch.flatten(start_dim=1) if encoded.mask is None else encoded.mask.pixels(batch)
+        worth = pixels.std(dim=1, correction=0) > MIN_CONTRAST
+        images.append(batch[worth])
+        kept.append(part[worth.numpy()])
         progress(min(start + BATCH, len(poses)), len(poses))
     if not sum(map(len, kept)):
         raise SettingError(
@@ -95,7 +101,8 @@ def training_views(
 def train(
     model: FamiliarityModel, encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"]
 ) -> TrainedModel:
-    """Train a model on the views at poses (see `training_views`)."""
+    """Train a new model on the views at poses (see `training_views`), as the renderer's eye sees them."""
+    seeing(model, encoding.for_eye(renderer.eye).mask)
     views, kept = training_views(encoding, renderer, poses)
     model.fit(views)
     return TrainedModel(model=model, encoding=encoding, eye=renderer.eye, poses=kept)

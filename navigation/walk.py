@@ -107,7 +107,7 @@ class Walk:
         Raises:
             SettingError: For a start outside of the world, or off its ground.
         """
-        self.renderer, self.encoding, self.route = renderer, encoding, route
+        self.renderer, self.encoding, self.route = renderer, encoding.for_eye(renderer.eye), route
         self.body, self.stopping = body or Body(), stopping or StoppingRules()
         self.world = renderer.world
         self.step_limit = self.stopping.step_limit(route.length, self.body.step_length)

@@ -12,7 +12,7 @@ RAY_SPACING = np.radians(5.0)  # rad
 
 
 def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float:
-    """Share of a panorama in which something is closer than a distance; the ground does not count.
+    """Share of what an eye sees in which something is closer than a distance; the ground does not count.
 
     It casts rays RAY_SPACING apart, the same for every heading, and tests them as render/scanline.py does: a ray d meets the
     triangle (a, b, c) where it passes all three edges on one side, at the distance D / (N . d). So the result depends on where
@@ -20,7 +20,7 @@ def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float
 
     Args:
         world: The world.
-        eye: Its elevations and height are used.
+        eye: Its elevations, height and visible pixels are used.
         pose: Where the eye is.
         distance: The distance (m).
 
@@ -46,4 +46,10 @@ def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float
     for start, end in ((a, b), (b, c), (c, a)):
         inside &= rays @ np.cross(start, end).T * volume >= 0
     inverse_distance = rays @ (np.cross(b - a, c - a) / volume[:, None]).T  # negative behind the eye
-    return float((inside & (inverse_distance > 1 / distance)).any(axis=1).mean())
+    covered = (inside & (inverse_distance > 1 / distance)).any(axis=1)
+    if eye.masked:
+        row = ((np.arange(rows) + 0.5) * eye.height / rows).astype(int)
+        column = np.floor((0.5 - (azimuths - pose.heading) / (2 * np.pi)) * eye.width).astype(int) % eye.width
+        seen = eye.visible()[row[:, None], column].ravel()
+        covered = covered[seen] if seen.any() else covered
+    return float(covered.mean())

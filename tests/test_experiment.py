@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import cv2
 import numpy as np
 import pytest
 import torch
@@ -104,7 +105,15 @@ def folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("folder"))
         Path("route.csv").write_text(ROUTE)
+        write_mask(Path("mask.png"), 40)
         yield
+
+
+def write_mask(path: Path, hidden: int) -> None:
+    """The picture of a mask of 720 x 150 pixels that hides some columns."""
+    picture = np.full((150, 720), 255, np.uint8)
+    picture[:, :hidden] = 0
+    cv2.imwrite(str(path), picture)
 
 
 def parsed(arguments: list[str]) -> Any:
@@ -200,7 +209,8 @@ OTHER: dict[str, Any] = {
     "world": "meadow", "world_seed": 5, "up": "y", "unit": "mm", "scale": 0.5, "strict": True,
     "ground": "mesh", "max_slope_deg": 30.0,
     "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
-    "top_deg": 50.0, "bottom_deg": -20.0, "cull_back_faces": True, "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
+    "top_deg": 50.0, "bottom_deg": -20.0, "field_deg": 270.0, "mask": "mask.png", "cull_back_faces": True,
+    "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
     "headings": "bearing", "columns": "x,y", "smooth_m": 0.1,
     "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "device": "cpu:0",
     "model": "infomax", "threads": 1, "step_m": 0.1, "offset_m": 0.1, "heading_noise_deg": 5.0, "scan_deg": 90.0, "scan_about_deg": 10.0,
@@ -235,6 +245,41 @@ def test_the_keys_differ_where_a_setting_differs(tmp_path):
     assert key_of(elsewhere) != key_of(others["route"])
     Path(tmp_path / "route.csv").write_text(ROUTE)
     assert key_of(elsewhere) == key_of(others["route"])
+    for hidden in (41, 40):
+        write_mask(tmp_path / "mask.png", hidden)
+        elsewhere = experiment_of({"mask": str(tmp_path / "mask.png")})
+        assert (key_of(elsewhere) == key_of(others["mask"])) == (hidden == 40)
+
+
+@pytest.mark.parametrize("given", [{"field_deg": 296.0}, {"mask": "mask.png"}, {"field_deg": 90.0, "mask": "mask.png"}])
+def test_a_field_and_a_mask_are_settings_of_a_run(given):
+    experiment = experiment_of(given)
+    assert {name: settings_of(experiment)[name] for name in given} == given
+    assert experiment_of(settings_of(experiment)) == experiment
+    command = shlex.split(run_command(experiment, "out"))[1:]
+    assert parsed(command).experiment() == experiment
+    # A mask that is not from a file is its own text.
+    unnamed = Experiment(eye=Eye(field=experiment.eye.field, mask=experiment.eye.visible()))
+    assert experiment_of(settings_of(unnamed)) == unnamed
+    assert parsed(shlex.split(run_command(unnamed, "out"))[1:]).experiment() == unnamed
+
+
+def test_a_field_and_a_mask_are_known_from_the_file_of_a_model(tmp_path):
+    eye = Eye(field=math.radians(270), mask="mask.png")
+    encoding = Encoding.named("edges", resize=6)
+    model = PerfectMemory().see(encoding.for_eye(eye).mask).fit(torch.rand(3, 25, 120))
+    save_model(TrainedModel(model=model, encoding=encoding, eye=eye), tmp_path / "model.safetensors")
+    given = {"model": str(tmp_path / "model.safetensors")}
+    assert experiment_of(given).eye == experiment_of(given | {"field_deg": 270.0}).eye == eye
+    with pytest.raises(SettingError, match="--field-deg and --mask"):
+        experiment_of(given | {"field_deg": 280.0})
+    for wrong in (eye, Eye(field=math.pi)):
+        with pytest.raises(SettingError, match="not trained for what this eye sees"):
+            TrainedModel(
+                model=PerfectMemory().fit(torch.rand(3, 25, 120)) if wrong == eye else model,
+                encoding=encoding,
+                eye=wrong,
+            )
 
 
 SAME = [

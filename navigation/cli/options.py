@@ -109,6 +109,10 @@ class ViewOptions(MeshOptions):
     """Elevation of a panorama's upper edge."""
     bottom_deg: float = degrees(default(Eye, "bottom"))
     """Elevation of its lower edge."""
+    field_deg: float | None = None
+    """Horizontal field of view, centred ahead; the rest of the circle is hidden from the model. Default: 360, or the model file's."""
+    mask: str | None = None
+    """A picture of what the eye sees of the panorama: white where it sees, black where it does not. Default: all, or the model file's."""
     cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
 

@@ -70,6 +70,9 @@ class ViewCommand(ViewOptions):
             view = renderer.render([(x, y, math.radians(heading_deg))])[0]
             backend = renderer.backend
         message(f"renderer: {backend}")
+        if surroundings.eye.masked:
+            message(f"black: what the eye does not see, {1 - surroundings.eye.visible().mean():.0%} of the panorama")
+            view = surroundings.eye.hide(view[None])[0]
         image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
         with replacing(self.out) as partial:
             partial.write_bytes(

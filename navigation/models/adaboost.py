@@ -42,6 +42,7 @@ class AdaBoost(Model):
 
     name = "adaboost"
     paper = "Freund and Schapire 1997; Viola and Jones 2001; Philippides et al. 2015"
+    takes_mask = True
     renamed = {"mined": "hard_negatives", "apart_deg": "tolerance_deg"}  # noqa: RUF012
 
     pool: int = whole(5000)
@@ -66,9 +67,10 @@ class AdaBoost(Model):
         self, pool: Float32[torch.Tensor, "k h w"], positives: Images, negatives: Float32[torch.Tensor, "m h w"]
     ) -> Learned:
         """The chosen filters, their thresholds and their votes."""
-        samples = torch.cat([positives, negatives]).flatten(start_dim=1)
+        samples = self._pixels(torch.cat([positives, negatives]))
         labels = np.repeat([1.0, -1.0], [len(positives), len(negatives)])
-        responses = (pool.flatten(start_dim=1) @ samples.T).cpu().numpy()  # (pool, samples)
+        filters = pool.flatten(start_dim=1) if self.mask is None else self.mask.select(pool)
+        responses = (filters @ samples.T).cpu().numpy()  # (pool, samples)
         thresholds = np.stack([thresholds_between(row) for row in responses])
         rows = zip(thresholds, responses, strict=True)
         bins = np.stack([np.searchsorted(*row).astype(np.uint8) for row in rows])
@@ -85,7 +87,7 @@ class AdaBoost(Model):
             cuts.append(thresholds[stump.filter, stump.bin])
             votes.append(vote * stump.sign)
         return {
-            "filters": pool[chosen],
+            "filters": self._as_filters(filters[chosen], pool.shape[1:]),
             "cuts": self._on_device(torch.tensor(np.array(cuts))),
             "votes": self._on_device(torch.tensor(votes, dtype=torch.float32)),
         }
@@ -95,7 +97,7 @@ class AdaBoost(Model):
         width = views.shape[2]
         away = torch.arange(width, device=views.device)
         wrong = torch.minimum(away, width - away) * (360 / width) >= self.tolerance_deg
-        bank = FilterBank(learned["filters"])
+        bank = self._bank(learned["filters"])
         scan = torch.cat([sum_of_votes(bank, learned, batch) for batch in in_batches(views)]).where(wrong, -torch.inf)
         turns = scan.topk(min(self.hard_negatives, int(wrong.sum())), dim=1).indices.tolist()
         return torch.stack([view.roll(k, dims=-1) for view, ks in zip(views, turns, strict=True) for k in ks])
@@ -104,10 +106,10 @@ class AdaBoost(Model):
         return {"filters": (self.features, height, width), "cuts": (self.features,), "votes": (self.features,)}
 
     def _prepare(self) -> None:
-        self._bank = FilterBank(self.learned["filters"])
+        self._chosen = self._bank(self.learned["filters"])
 
     def _scan(self, views: Images) -> Scans:
-        return sum_of_votes(self._bank, self.learned, views)
+        return sum_of_votes(self._chosen, self.learned, views)
 
 
 def sum_of_votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:

@@ -4,8 +4,8 @@ import torch
 
 from tussock.world.settings import number, whole
 
+from ..feature_mask import energies
 from .base import Images, Learned, Model, Scans, Shapes, model
-from .filter_bank import FilterBank
 
 
 @model
@@ -25,6 +25,7 @@ class Autoencoder(Model):
 
     name = "autoencoder"
     paper = "Vincent et al. 2008; Philippides et al. 2015"
+    takes_mask = True
 
     units: int = whole(100, high=10_000)  # W W^T is its square
     epochs: int = whole(50)
@@ -34,7 +35,7 @@ class Autoencoder(Model):
 
     def _learn(self, views: Images) -> Learned:
         random = self._random()
-        data = views.flatten(start_dim=1)
+        data = self._pixels(views)
         inputs = data.shape[1]
         weights = (torch.randn(self.units, inputs, generator=random) / inputs**0.5).to(self.device).requires_grad_()
         hidden = torch.zeros(self.units, device=self.device, requires_grad=True)
@@ -51,8 +52,8 @@ class Autoencoder(Model):
                 optimiser.step()
         shape = views.shape[1:]
         return {
-            "weights": weights.detach().reshape(-1, *shape),
-            "visible": visible.detach().reshape(shape),
+            "weights": self._as_filters(weights.detach(), shape),
+            "visible": self._as_filters(visible.detach()[None], shape)[0],
             "hidden": hidden.detach(),
         }
 
@@ -61,14 +62,14 @@ class Autoencoder(Model):
 
     def _prepare(self) -> None:
         weights, visible = self.learned["weights"].flatten(start_dim=1), self.learned["visible"].flatten()
-        self._bank = FilterBank(torch.cat([self.learned["weights"], self.learned["visible"][None]]))
+        self._responses = self._bank(torch.cat([self.learned["weights"], self.learned["visible"][None]])).responses
         self._overlap, self._projection, self._energy = weights @ weights.T, weights @ visible, visible @ visible
 
     def _scan(self, views: Images) -> Scans:
-        responses = self._bank.responses(views)  # (n, w, units + 1)
+        responses = self._responses(views)  # (n, w, units + 1)
         drive, bias = responses[..., :-1], responses[..., -1]
         h = torch.tanh(drive + self.learned["hidden"])
         product = (h * drive).sum(dim=2) + bias
         energy = (h * (h @ self._overlap)).sum(dim=2) + 2 * (h @ self._projection) + self._energy
-        squared = views.square().sum(dim=(1, 2))[:, None] - 2 * product + energy
-        return -(squared.clamp(min=0) / views[0].numel()).sqrt()
+        squared = energies(views, self.mask) - 2 * product + energy
+        return -(squared.clamp(min=0) / self._size(*views.shape[1:])).sqrt().float()

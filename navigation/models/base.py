@@ -14,7 +14,9 @@ from tussock.world.errors import SettingError
 from tussock.world.settings import instance_of, whole
 from tussock.world.specs import format_spec, own_parameters
 
+from ..feature_mask import WITH_MASK, FeatureMask
 from .checks import MAX_COLUMNS, MAX_VALUE, Images, all_bounded, check_device, check_scan, check_training
+from .filter_bank import FilterBank
 from .registry import MODELS
 from .rotations import in_batches
 
@@ -106,21 +108,25 @@ class Model(ABC):
         seed: Of everything it draws.
         learned: Named tensors. Together with the parameters they are what a model file holds.
         shape: (h, w) of the views it learned; None before training.
+        mask: What it sees of views; None means everything (see `see`).
         name: Its name in messages; for the models of tussock, that in the registry.
         paper: Where it comes from.
         renamed: Former names of parameters, which specs and files may still use, with the present ones.
         dtypes: Of learned tensors that are not float32; None means any.
+        takes_mask: Whether the class minds `mask`, as those of tussock do.
     """
 
     name = "model"
     paper = ""
     renamed: ClassVar[Mapping[str, str]] = {}
     dtypes: ClassVar[Mapping[str, torch.dtype | None]] = {}
+    takes_mask: ClassVar[bool] = False
 
     device: str = instance_of(str, "cpu", "the name of a device")
     seed: int = whole(0, low=0)
     learned: Learned = attrs.field(init=False, repr=False, factory=dict)
     shape: tuple[int, int] | None = attrs.field(init=False, repr=False, default=None)
+    mask: FeatureMask | None = attrs.field(init=False, repr=False, default=None)
 
     def __init_subclass__(cls) -> None:
         cls.name = vars(cls).get("name", cls.__name__)
@@ -131,10 +137,23 @@ class Model(ABC):
         changed = {key: self.parameters[key] for key in defaults if self.parameters[key] != defaults[key]}
         return format_spec(MODELS.name_of(type(self)), changed)
 
+    def see(self: Self, mask: FeatureMask | None) -> Self:
+        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Views are of the full circle all the same, and turn
+        behind it. Raises SettingError after training, and for a class that does not mind masks.
+        """
+        if self.shape is not None and mask != self.mask:
+            raise SettingError(f"{self.name} has learned through another mask; make a new model")
+        if mask is not None and not self.takes_mask:
+            raise SettingError(f"{self.name} does not mind what the eye cannot see; {WITH_MASK}")
+        self.mask = mask
+        return self
+
     def fit(self: Self, views: Images) -> Self:
         """Learn the views, forgetting earlier ones. Raises SettingError for no views and for values that are not finite."""
         check_device(self.device)
         check_training(views)
+        if self.mask is not None:
+            self.mask.check(views.shape[1:])
         views = self._on_device(views)
         self.restore((views.shape[1], views.shape[2]), self._learn(views))
         return self
@@ -190,6 +209,8 @@ class Model(ABC):
 
     def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
         """Refuse what a model with these parameters cannot have learned from views of a shape. Raises SettingError."""
+        if self.mask is not None:
+            self.mask.check(shape)
         if shape[1] > MAX_COLUMNS:
             raise SettingError(f"{self.name}: views of {shape[1]} columns; give at most {MAX_COLUMNS}")
         expected = self._shapes(*shape)
@@ -210,6 +231,28 @@ class Model(ABC):
 
     def _on_device(self, tensor: torch.Tensor) -> torch.Tensor:
         return tensor.to(self.device)
+
+    def _seen(self, views: Images) -> Images:
+        """Views as the eye sees them at their present heading."""
+        return views if self.mask is None else self.mask.images(views)
+
+    def _pixels(self, views: Images) -> Float32[torch.Tensor, "n pixels"]:
+        """What the eye sees of views at their present heading, in rows."""
+        return views.flatten(start_dim=1) if self.mask is None else self.mask.pixels(views)
+
+    def _size(self, height: int, width: int) -> int:
+        """How many pixels of a view the eye sees."""
+        return height * width if self.mask is None else self.mask.count
+
+    def _as_filters(self, rows: Float32[torch.Tensor, "m pixels"], shape: torch.Size) -> Float32[torch.Tensor, "m h w"]:
+        """Weights of such rows as filters of a shape (h, w), 0 where nothing is seen."""
+        return rows.reshape(-1, *shape) if self.mask is None else self.mask.spread(rows)
+
+    def _bank(
+        self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None
+    ) -> FilterBank:
+        """Filters that meet what the eye sees."""
+        return FilterBank(filters, biases, self.mask)
 
     def _random(self) -> torch.Generator:
         """A generator at the beginning of this model's draws. On the CPU, so that every device draws the same."""

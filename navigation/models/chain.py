@@ -6,10 +6,11 @@ from jaxtyping import Bool, Float32, Int64
 
 from tussock.world.settings import number
 
+from ..feature_mask import energies
 from .base import model
 from .checks import check_scan
 from .filter_bank import FilterBank
-from .perfect_memory import PerfectMemory, energies
+from .perfect_memory import PerfectMemory
 
 SAMPLE = 32  # snapshots between which the difference of unrelated positions is measured
 
@@ -24,7 +25,7 @@ class Chain(PerfectMemory):
     Attributes:
         window: Share of the sequence ahead of the active snapshot that is compared, and half as much behind.
         max_mismatch: Largest RMS difference of a match, as a share of the median between unrelated positions. Beyond it the match
-            is rejected, and the window doubles.
+            is rejected, and the window doubles. Unrelated positions are compared at their best rotation; with a mask, as they were seen.
     """
 
     name = "chain"
@@ -41,12 +42,14 @@ class Chain(PerfectMemory):
     def _prepare(self) -> None:
         super()._prepare()
         pick = torch.linspace(0, len(self.snapshots) - 1, min(SAMPLE, len(self.snapshots))).round().long()
-        sample = self.snapshots[pick] - self._level
-        squares = energies(sample)
-        correlation = FilterBank(sample).responses(sample).amax(dim=1)
+        sample = self.snapshots[pick] - (self._level if self.mask is None else 0)
+        squares = energies(sample, None)
+        correlations = FilterBank(sample).responses(sample)
+        # What a mask hid of a snapshot is not known: then it is compared as it was seen, at rotation 0.
+        correlation = correlations.amax(dim=1) if self.mask is None else correlations[:, 0]
         pairs = torch.triu_indices(len(sample), len(sample), 1).unbind()
-        squared = (squares[:, None] + squares - 2 * correlation)[pairs]
-        rms = (squared.clamp(min=0) / sample[0].numel()).sqrt()
+        squared = (squares + squares[:, 0] - 2 * correlation)[pairs]
+        rms = (squared.clamp(min=0) / self._size(*sample.shape[1:])).sqrt()
         self.max_difference = self.max_mismatch * float(rms.median()) if len(rms) else np.inf  # RMS
 
 

@@ -19,6 +19,7 @@ from tussock.world.settings import instance_of, settings
 from tussock.world.specs import Spec
 
 from ..encoding import OLD_NAMES, STEPS, Encoding
+from ..feature_mask import FeatureMask
 from .base import FamiliarityModel, Model
 from .checks import check_device
 from .opponents import OPPONENT, Opponent
@@ -26,6 +27,7 @@ from .registry import MODELS
 from .specs import find_model, make_model, present_names
 
 HEADER, VERSION = "tussock", 1
+VISIBLE = "mask.visible"  # the tensor of the mask of a model that does not see everything
 
 
 @settings
@@ -58,6 +60,7 @@ class TrainedModel:
         """Refuse an untrained model, and poses that cannot be those of the views that it learned. Raises SettingError."""
         if isinstance(self.model, Model) and self.model.shape is None:
             raise SettingError(f"{self.model.name} has learned nothing yet; call fit(views) first")
+        self._check_mask()
         poses: Any = self.poses
         if poses is None:
             return
@@ -71,6 +74,14 @@ class TrainedModel:
         if index is not None and len(poses) <= int(index):
             raise SettingError(
                 f"{len(poses)} poses, and it knows view {int(index)}; give the pose of each view, or none"
+            )
+
+    def _check_mask(self) -> None:
+        """Refuse a model that was trained as if the eye saw more or less than it does. Raises SettingError."""
+        mask = getattr(self.model, "mask", None)
+        if self.encoding is not None and self.eye is not None and mask != self.encoding.for_eye(self.eye).mask:
+            raise SettingError(
+                f"the model was not trained for what this eye sees ({self.eye}); call model.see(encoding.for_eye(eye).mask) before fit"
             )
 
 
@@ -92,9 +103,12 @@ def save_model(trained: TrainedModel, path: str | os.PathLike) -> None:
         "parameters": {key: value for key, value in model.parameters.items() if key != "device"},
         "shape": model.shape,
         "encoding": None if encoding is None else encoding.text_in_files(),
-        "eye": None if eye is None else attrs.asdict(eye),
+        "eye": None if eye is None else eye.plain(),
     }
     tensors = {f"learned.{key}": tensor.detach().cpu().contiguous() for key, tensor in model.learned.items()}
+    if (mask := model.mask) is not None:
+        header["mask"] = {"normalised": mask.normalised, "gain": mask.gain}
+        tensors[VISIBLE] = mask.visible.contiguous()
     if trained.poses is not None:
         tensors["poses"] = torch.tensor(trained.poses)
     with replacing(path) as partial:
@@ -172,6 +186,11 @@ def _trained(path: Path, header: dict[str, Any], tensors: dict[str, torch.Tensor
     given = {key: tuple(value) if isinstance(value, list) else value for key, value in header["parameters"].items()}
     model = Spec(name, target, present_names(target, given)).make(device=device)
     poses = tensors.pop("poses", None)
+    visible = tensors.pop(VISIBLE, None)
+    if (visible is None) != (header.get("mask") is None):
+        raise ValueError("its mask is incomplete")
+    if visible is not None:
+        model.see(FeatureMask(visible, **header["mask"]))
     model.restore((height, width), {key.removeprefix("learned."): tensor for key, tensor in tensors.items()})
     scan = model.scan(torch.zeros(1, height, width))  # tensors that do not fit together fail here
     if scan.shape != (1, width):

@@ -6,7 +6,6 @@ from jaxtyping import Float32
 from tussock.world.settings import number, whole
 
 from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
-from .filter_bank import FilterBank
 
 # Presets of the rate: eta / N of one update, for `units` units of `inputs` inputs.
 RATES = {
@@ -27,38 +26,40 @@ class Infomax(IncrementalModel):
     For a view x: u = W x, y = tanh u, W += eta / N (W - (y + u) (W^T u)^T). Section 3.3.3 of the thesis. Constant memory.
 
     Attributes:
-        units: Number of units; None means as many as pixels.
+        units: Number of units; None means as many as (visible) pixels.
         rate: "z-scored", "unit-range" or "baddeley" (see RATES), or the value of eta / N.
         traversals: Passes over the views, in their order.
     """
 
     name = "infomax"
     paper = "Baddeley et al. 2012"
+    takes_mask = True
 
     units: int | None = whole(None, optional=True)
     rate: str | float = number("z-scored", low=0, names=RATES)
     traversals: int = whole(1)
 
     def _begin(self, height: int, width: int) -> Learned:
-        inputs = height * width
+        inputs = self._size(height, width)
         weights = self._on_device(torch.randn(self.units or inputs, inputs, generator=self._random()))
         deviation, mean = torch.std_mean(weights, dim=1, keepdim=True)
-        return {"weights": ((weights - mean) / deviation).reshape(-1, height, width)}
+        return {"weights": self._as_filters((weights - mean) / deviation, torch.Size((height, width)))}
 
     def _add(self, learned: Learned, views: Images) -> Learned:
-        weights = learned["weights"].flatten(start_dim=1).clone()
+        filters = learned["weights"]
+        weights = (filters.flatten(start_dim=1) if self.mask is None else self.mask.select(filters)).clone()
         units, inputs = weights.shape
         rate = RATES[self.rate](inputs, units) if isinstance(self.rate, str) else self.rate
         for _ in range(self.traversals):
-            for view in views.flatten(start_dim=1):
+            for view in self._pixels(views):
                 infomax_update(weights, view, rate)
-        return {"weights": weights.reshape(-1, *views.shape[1:])}
+        return {"weights": self._as_filters(weights, views.shape[1:])}
 
     def _shapes(self, height: int, width: int) -> Shapes:
-        return {"weights": (self.units or height * width, height, width)}
+        return {"weights": (self.units or self._size(height, width), height, width)}
 
     def _prepare(self) -> None:
-        self._banks = [FilterBank(weights) for weights in self.learned["weights"].split(UNITS)]
+        self._banks = [self._bank(weights) for weights in self.learned["weights"].split(UNITS)]
 
     def _scan(self, views: Images) -> Scans:
         total = torch.zeros(len(views), views.shape[2], device=views.device)

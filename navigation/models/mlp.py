@@ -19,7 +19,6 @@ from tussock.world.settings import choice, number, numbers, whole, wholes
 
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .checks import check_scan, check_training
-from .filter_bank import FilterBank
 
 ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
     "identity": lambda x: x,
@@ -58,6 +57,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
     name = "mlp"
     paper = "the thesis, section 4.4"
     dtypes = {"classes": None}  # noqa: RUF012
+    takes_mask = True
 
     hidden_layer_sizes: tuple[int, ...] | int = wholes((100,), single=True)
     activation: str = choice("relu", ACTIVATIONS)
@@ -72,7 +72,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
     def __sklearn_clone__(self) -> "MLP":
         """An untrained copy. scikit-learn's own way demands that a parameter is the very object that was given."""
-        return type(self)(**self.parameters)
+        return type(self)(**self.parameters).see(self.mask)
 
     def fit(self, views: Views, y: Any = None) -> "MLP":
         """Train from scratch.
@@ -118,7 +118,8 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         """Log-odds of the second class for views as they are."""
         images = as_images(views)
         check_scan(images, self.shape)
-        return forward(self._on_device(images.flatten(start_dim=1)), self._layers, self.activation).cpu().numpy()
+        seen = self._seen(self._on_device(images))
+        return forward(seen.flatten(start_dim=1), self._layers, self.activation).cpu().numpy()
 
     def predict_proba(self, views: Views) -> Float[np.ndarray, "n 2"]:
         """Probability of each class for views as they are."""
@@ -142,7 +143,9 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
     ) -> Learned:
         """A network that tells images whose target is 1 from those whose target is 0."""
         learned: Learned = {"classes": classes}
-        for k, (weights, biases) in enumerate(self._train(images.flatten(start_dim=1), self._on_device(targets))):
+        layers = self._train(self._pixels(images), self._on_device(targets))
+        layers[0] = (self._as_filters(layers[0][0], images.shape[1:]).flatten(start_dim=1), layers[0][1])
+        for k, (weights, biases) in enumerate(layers):
             learned |= {f"weights{k}": weights, f"biases{k}": biases}
         return learned
 
@@ -162,11 +165,11 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         depth = sum(key.startswith("weights") for key in self.learned)
         self._layers = [(self.learned[f"weights{k}"], self.learned[f"biases{k}"]) for k in range(depth)]
         weights, biases = self._layers[0]
-        self._bank = FilterBank(weights.reshape(-1, *self.shape), biases)
+        self._responses = self._bank(weights.reshape(-1, *self.shape), biases).responses
 
     def _scan(self, views: Images) -> Scans:
         """The first layer's weights are the engine's filters; the others see its units at each rotation."""
-        activity = self._bank.responses(views)  # (n, w, units)
+        activity = self._responses(views)  # (n, w, units)
         return forward(ACTIVATIONS[self.activation](activity), self._layers[1:], self.activation)
 
     def _train(self, inputs: torch.Tensor, targets: torch.Tensor) -> Layers:

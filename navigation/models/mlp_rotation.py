@@ -37,6 +37,7 @@ class MLPRotation(Model):
 
     name = "mlp-rotation"
     paper = "the thesis's network, trained on all rotations; here"
+    takes_mask = True
     renamed = {"sway_deg": "jitter_deg", "penalty": "weight_decay"}  # noqa: RUF012
 
     units: int = whole(100)
@@ -54,7 +55,7 @@ class MLPRotation(Model):
 
     def _learn(self, views: Images) -> Learned:
         random = self._random()
-        segment = self.segment_of(views)
+        segment = self.segment_of(self._seen(views))
         n, height, width = views.shape
         steps = self.steps or max(500, n)
         networks = int(segment.max()) + 1
@@ -64,13 +65,18 @@ class MLPRotation(Model):
         parameters = [self._on_device(each).requires_grad_() for each in (weights, biases, output)]
 
         target = self._on_device(gaussian(width, math.radians(self.target_deg)))
-        noise = self.noise * float(views.std())
+        noise = self.noise * float(self._pixels(views).std())
         optimiser = torch.optim.AdamW(parameters, lr=self.rate, weight_decay=self.weight_decay, fused=True)
         schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: rate_share(step / steps))
         for batch in islice(batches(n, self.batch_size, random), steps):
-            noisy = jittered(views[self._on_device(batch)], math.radians(self.jitter_deg), random)
-            noisy.add_(self._on_device(torch.randn(noisy.shape, generator=random)), alpha=noise)
-            outputs = network_outputs(FilterBank(*parameters[:2]), parameters[2], noisy)  # (n, w, networks)
+            seen = jittered(views[self._on_device(batch)], math.radians(self.jitter_deg), random)
+            grain = self._on_device(torch.randn(seen.shape, generator=random))
+            if self.mask is None:
+                responses = self._bank(*parameters[:2]).responses(seen.add_(grain, alpha=noise))
+            else:  # the noise is added to what is normalised
+                responses = self._bank(*parameters[:2]).responses(seen)
+                responses = responses + FilterBank(parameters[0], mask=self.mask.linear()).responses(noise * grain)
+            outputs = network_outputs(responses, parameters[2])  # (n, w, networks)
             log_shares = log_softmax(outputs.flatten(start_dim=1), dim=1).reshape(outputs.shape)
             loss = -(log_shares[torch.arange(len(batch)), :, segment[batch]] @ target).mean()
             optimiser.zero_grad()
@@ -90,10 +96,10 @@ class MLPRotation(Model):
         return {"weights": (None, height, width), "biases": (None,), "output": (None, self.units)}
 
     def _prepare(self) -> None:
-        self._bank = FilterBank(self.learned["weights"], self.learned["biases"])
+        self._responses = self._bank(self.learned["weights"], self.learned["biases"]).responses
 
     def _outputs(self, views: Images) -> Float32[torch.Tensor, "n w networks"]:
-        return network_outputs(self._bank, self.learned["output"], views)
+        return network_outputs(self._responses(views), self.learned["output"])
 
     def _scan(self, views: Images) -> Scans:
         return self._outputs(views)[..., 0]
@@ -133,9 +139,9 @@ def rate_share(done: float) -> float:
 
 
 def network_outputs(
-    bank: FilterBank, output: Float32[torch.Tensor, "networks units"], views: Images
+    responses: Float32[torch.Tensor, "n w all_units"], output: Float32[torch.Tensor, "networks units"]
 ) -> Float32[torch.Tensor, "n w networks"]:
-    """Output of networks that see the same views; the bank holds the units of all of them, one network after the other."""
+    """Output of networks that see the same views, from the inputs of the units of all of them, one network after the other."""
     own = torch.eye(len(output), device=output.device)
     readout = (output[:, :, None] * own[:, None]).flatten(0, 1)  # (units of all networks, networks)
-    return relu(bank.responses(views)) @ readout
+    return relu(responses) @ readout

@@ -40,6 +40,7 @@ class MushroomBody(IncrementalModel):
     name = "mushroom-body"
     paper = "Ardin et al. 2016"
     dtypes = {"wiring": torch.int64}  # noqa: RUF012
+    takes_mask = True
 
     columns: int = whole(36)
     rows: int = whole(10)
@@ -84,7 +85,7 @@ class MushroomBody(IncrementalModel):
 
     def _add(self, learned: Learned, views: Images) -> Learned:
         synapses = learned["synapses"].clone()
-        fields = self._bank(*views.shape[1:])
+        fields = self._field_bank(*views.shape[1:])
         for batch in views.split(BATCH):
             unturned = torch.stack([self._projection(fields, view)[:, 0] for view in batch], dim=1)
             for firing in self._firing(unturned, learned["wiring"]):
@@ -96,7 +97,7 @@ class MushroomBody(IncrementalModel):
 
     def _prepare(self) -> None:
         assert self.shape is not None
-        self._fields = self._bank(*self.shape)
+        self._fields = self._field_bank(*self.shape)
 
     def _check_fields(self, height: int, width: int) -> None:
         if self.columns * self.rows * height * width > MAX_NUMBERS:
@@ -105,10 +106,16 @@ class MushroomBody(IncrementalModel):
                 "give fewer columns or rows, or smaller views"
             )
 
-    def _bank(self, height: int, width: int) -> FilterBank:
-        """The fields of the projection neurons, for views of height x width."""
+    def _field_bank(self, height: int, width: int) -> FilterBank:
+        """The fields of the projection neurons, for views of height x width; with a mask, of what is visible of each."""
         self._check_fields(height, width)
-        return FilterBank(self._on_device(receptive_fields(self.columns, self.rows, height, width)))
+        fields = receptive_fields(self.columns, self.rows, height, width)
+        if self.mask is not None:
+            fields = fields * self.mask.visible
+            shares = fields.sum(dim=(1, 2))  # of the fields that are visible, 0 to 1
+            fields = fields / torch.where(shares > 0, shares, 1)[:, None, None]
+            self._shares = self._on_device(shares.reshape(self.rows, self.columns, 1))
+        return self._bank(self._on_device(fields))
 
     def _scan(self, views: Images) -> Scans:
         scans = []
@@ -118,10 +125,26 @@ class MushroomBody(IncrementalModel):
         return smoothed(torch.stack(scans), np.radians(self.smoothing_deg))
 
     def _projection(self, fields: FilterBank, view: Float32[torch.Tensor, "h w"]) -> Float32[torch.Tensor, "neurons w"]:
-        """Output of the projection neurons at each rotation. Over all rotations, a field sees all of its elevation."""
+        """Output of the projection neurons at each rotation.
+
+        Over all rotations, a field sees all of its elevation. Behind a mask this would be what the eye does not see at this rotation:
+        there mean and contrast are those over the fields at an elevation, each weighted by the share of it that is visible, and
+        neurons that see nothing are silent.
+        """
         averages = fields.responses(view[None])[0].T
+        if self.mask is not None:
+            return self._seen_projection(averages.unflatten(0, (self.rows, self.columns))).flatten(0, 1)
         contrast, mean = torch.std_mean(averages, dim=1, keepdim=True, correction=0)
         return (averages - mean) / (contrast + 0.02 * contrast.max() + 1e-9) ** self.adaptation
+
+    def _seen_projection(
+        self, averages: Float32[torch.Tensor, "rows columns w"]
+    ) -> Float32[torch.Tensor, "rows columns w"]:
+        total = self._shares.sum(dim=1, keepdim=True).clamp(min=1e-9)
+        mean = (self._shares * averages).sum(dim=1, keepdim=True) / total
+        contrast = ((self._shares * (averages - mean).square()).sum(dim=1, keepdim=True) / total).sqrt()
+        gain = (contrast + 0.02 * contrast.amax(dim=0) + 1e-9) ** self.adaptation
+        return ((averages - mean) / gain).where(self._shares > 0, 0)
 
     def _firing(self, projections: Float32[torch.Tensor, "neurons n"], wiring: torch.Tensor) -> torch.Tensor:
         """Indices (n, firing) of the Kenyon cells that fire at each of n projections."""

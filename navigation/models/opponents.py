@@ -8,11 +8,13 @@ from typing import Any, TypeVar
 
 import torch
 
+from ..feature_mask import FeatureMask, seeing
 from .base import FamiliarityModel, Images, IncrementalModel, Learned, Model, Scans, Shapes, memory_bytes
 
 OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
 
 T = TypeVar("T")
+Memories = TypeVar("Memories", bound="Opponent")
 
 
 class Opponent(Model):
@@ -48,6 +50,18 @@ class Opponent(Model):
     def dtypes(self) -> Mapping[str, torch.dtype | None]:  # type: ignore[override]
         """Of learned tensors that are not float32."""
         return _joined(self.attractive.dtypes, self.repulsive.dtypes)
+
+    @property
+    def takes_mask(self) -> bool:  # type: ignore[override]
+        """Whether the model minds `mask`."""
+        return self.attractive.takes_mask
+
+    def see(self: Memories, mask: FeatureMask | None) -> Memories:
+        """Both memories see through the same mask."""
+        super().see(mask)
+        for memory in (self.attractive, self.repulsive):
+            memory.see(mask)
+        return self
 
     def _learn(self, views: Images) -> Learned:
         return _joined(self.attractive._learn(views), self.repulsive._learn(facing_away(views)))
@@ -85,6 +99,12 @@ class OutsideOpponent:
 
     def __init__(self, model: Any):
         self.attractive, self.repulsive = copy.deepcopy(model), copy.deepcopy(model)
+
+    def see(self, mask: FeatureMask | None) -> "OutsideOpponent":
+        """Both memories see through the same mask. Raises SettingError where the model does not mind that."""
+        seeing(self.attractive, mask)
+        seeing(self.repulsive, mask)
+        return self
 
     def fit(self, views: Images) -> "OutsideOpponent":
         """Let both memories learn the views."""

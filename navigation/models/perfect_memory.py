@@ -6,9 +6,10 @@ from jaxtyping import Float32, Int64
 
 from tussock.render.compile import compiled
 
+from ..feature_mask import energies
 from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
 from .checks import check_scan
-from .filter_bank import NearestFilters
+from .filter_bank import FILTERS, NearestFilters
 from .rotations import in_batches
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
@@ -20,15 +21,17 @@ class PerfectMemory(IncrementalModel):
     """Keeps every view; familiarity is minus the RMS difference from the most similar one.
 
     Equation 1 of the thesis (section 4.3), exactly: the distance |v - s|^2 = |v|^2 - 2 v . s + |s|^2 needs one correlation, and where
-    rounding could change which rotation is the best, it is computed again directly. Memory grows with the number of views.
+    rounding could change which rotation is the best, it is computed again directly. With a mask it is that of the visible pixels, in
+    float64. Memory grows with the number of views.
     """
 
     name = "perfect-memory"
     paper = "Zeil, Hofmann and Chahl 2003; Baddeley et al. 2012"
+    takes_mask = True
 
     @property
     def snapshots(self) -> Float32[torch.Tensor, "m h w"]:
-        """The views it keeps."""
+        """The views it keeps, as the eye saw them."""
         return self.learned["snapshots"]
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
@@ -43,16 +46,20 @@ class PerfectMemory(IncrementalModel):
         return {"snapshots": torch.empty(0, height, width, device=self.device)}
 
     def _add(self, learned: Learned, views: Images) -> Learned:
-        return {"snapshots": torch.cat([learned["snapshots"], views])}
+        return {"snapshots": torch.cat([learned["snapshots"], self._seen(views)])}
 
     def _shapes(self, height: int, width: int) -> Shapes:
         return {"snapshots": (None, height, width)}
 
     def _prepare(self) -> None:
+        if self.mask is not None:
+            blocks = self.snapshots.split(FILTERS)
+            self._banks = [(self._bank(block), energies(block.double(), None)[:, 0]) for block in blocks]
+            return
         # The distance does not change when a constant is taken from all pixels; float32 keeps more digits of it around 0.
         self._level = float(self.snapshots.mean(dtype=torch.float64))
         centred = self.snapshots - self._level
-        self._energies = energies(centred)
+        self._energies = energies(centred, None)[:, 0]
         self._filters = NearestFilters(-2 * centred, self._energies)
         self._on_cpu = self.snapshots.cpu().numpy()
 
@@ -61,20 +68,31 @@ class PerfectMemory(IncrementalModel):
 
     def _nearest(self, views: Images, among: slice = slice(None)) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
+        if self.mask is not None:
+            return self._nearest_seen(views, among)
         height, width = views.shape[1:]
         centred = views - self._level
         responses, index = self._filters.nearest(centred, among)
-        of_views = energies(centred)
+        of_views = energies(centred, None)[:, 0]
         squared = (of_views[:, None] + responses).cpu().numpy()
         tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max()).cpu().numpy()
         _rescore(views.cpu().numpy(), self._on_cpu, index.cpu().numpy(), tolerance, squared)
         familiarity = -np.sqrt(squared / np.float32(height * width))
         return self._on_device(torch.from_numpy(familiarity)), index
 
-
-def energies(images: Images) -> Float32[torch.Tensor, " n"]:
-    """Sum of the squares of each image."""
-    return images.square().sum(dim=(1, 2))
+    def _nearest_seen(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+        """The same behind a mask: what is seen of a view, and so its |v|^2, differs from rotation to rotation."""
+        compared = torch.zeros(len(self.snapshots), dtype=torch.bool, device=views.device)
+        compared[among] = True
+        of_views = energies(views, self.mask)
+        least, index = torch.full_like(of_views, torch.inf), torch.zeros_like(of_views, dtype=torch.int64)
+        for k, ((bank, squares), some) in enumerate(zip(self._banks, compared.split(FILTERS), strict=True)):
+            distances = (squares - 2 * bank.exact(views)).where(some, torch.inf)
+            values, which = distances.min(dim=2)
+            index = (which + k * FILTERS).where(values < least, index)
+            least = torch.minimum(values, least)
+        squared = (of_views + least).clamp(min=0)
+        return -(squared / self._size(*views.shape[1:])).sqrt().float(), index
 
 
 @compiled(fastmath={"reassoc"})

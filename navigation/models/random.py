@@ -12,12 +12,13 @@ class RandomHeadings(Model):
     """Learns nothing of the views; familiarity is a random number from 0 to 1, drawn for each rotation of each view.
 
     The control of Ardin et al.: the most familiar heading is random, and differs where anything in the view differs. The number is
-    a hash of the view at that rotation, with weights drawn from the seed: the same view always has the same heading.
+    a hash of what is visible of the view at that rotation, with weights drawn from the seed: the same view always has the same heading.
     Memory: one weight for each row and each column.
     """
 
     name = "random"
     paper = "Ardin et al. 2016"
+    takes_mask = True
     dtypes = {"rows": torch.int64, "columns": torch.int64}  # noqa: RUF012
 
     def _learn(self, views: Images) -> Learned:
@@ -31,14 +32,20 @@ class RandomHeadings(Model):
     def _prepare(self) -> None:
         self._rows, columns = (self.learned[key].cpu().numpy().view(np.uint64) for key in ("rows", "columns"))
         column = np.arange(len(columns))
-        self._columns = columns[
-            (column[:, None] + column) % len(columns)
-        ]  # (w, w) that of each column at each rotation
+        self._at = (column[:, None] + column) % len(columns)  # (w, w) where each column is at each rotation
+        self._columns = columns[self._at]
 
     def _scan(self, views: Images) -> Scans:
-        pixels = views.cpu().numpy() + np.float32(0)  # -0 becomes 0
-        columns = split_mix((pixels.view(np.uint32).astype(np.uint64) * self._rows[:, None]).sum(axis=1))
-        hashes = split_mix(columns @ self._columns)
+        pixels = (views.cpu().numpy() + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 becomes 0
+        if self.mask is None:
+            hashes = split_mix(split_mix((pixels * self._rows[:, None]).sum(axis=1)) @ self._columns)
+        else:
+            rows = self._rows[:, None] * self.mask.visible.numpy().astype(np.uint64)
+            seen = split_mix(
+                pixels.transpose(0, 2, 1) @ rows
+            )  # (n, w, w) each column where each of the mask hides some of it
+            column = np.arange(len(self._at))[:, None]
+            hashes = split_mix((seen[:, column, self._at] * self._columns).sum(axis=1))
         return self._on_device(torch.from_numpy((hashes >> np.uint64(40)).astype(np.float32) * np.float32(2**-24)))
 
 

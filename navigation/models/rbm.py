@@ -5,6 +5,7 @@ from torch.nn.functional import softplus
 
 from tussock.world.settings import number, whole
 
+from ..feature_mask import energies
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .filter_bank import FilterBank
 
@@ -29,6 +30,7 @@ class RBM(Model):
 
     name = "rbm"
     paper = "Hinton 2002; Philippides et al. 2015"
+    takes_mask = True
 
     units: int = whole(200)
     epochs: int = whole(50)
@@ -39,7 +41,7 @@ class RBM(Model):
 
     def _learn(self, views: Images) -> Learned:
         random = self._random()
-        data = self.scale * views.flatten(start_dim=1)
+        data = self.scale * self._pixels(views)
         weights = 0.01 * torch.randn(self.units, data.shape[1], generator=random).to(self.device)
         visible, hidden = data.mean(dim=0), torch.zeros(self.units, device=self.device)
         parameters = (weights, visible, hidden)
@@ -51,7 +53,11 @@ class RBM(Model):
                     velocity.mul_(self.momentum).add_(gradient, alpha=self.rate / len(batch))
                     parameter += velocity
         shape = views.shape[1:]
-        return {"weights": weights.reshape(-1, *shape), "visible": visible.reshape(shape), "hidden": hidden}
+        return {
+            "weights": self._as_filters(weights, shape),
+            "visible": self._as_filters(visible[None], shape)[0],
+            "hidden": hidden,
+        }
 
     def _gradients(self, data: torch.Tensor, parameters: Parameters, random: torch.Generator) -> Parameters:
         """Of the log-probability of a batch by each of the parameters, by CD-1."""
@@ -69,11 +75,13 @@ class RBM(Model):
     def _prepare(self) -> None:
         hidden = self.learned["hidden"]
         filters = torch.cat([self.learned["weights"], self.learned["visible"][None]])
-        self._bank = FilterBank(filters, torch.cat([hidden, hidden.new_zeros(1)]))
+        self._scaled = None if self.mask is None else self.mask.scaled(self.scale)
+        self._responses = FilterBank(filters, torch.cat([hidden, hidden.new_zeros(1)]), self._scaled).responses
 
     def _scan(self, views: Images) -> Scans:
-        views = self.scale * views
-        responses = self._bank.responses(views)  # (n, w, units + 1)
-        of_views, of_visible = views.square().sum(dim=(1, 2)), self.learned["visible"].square().sum()
-        squared = of_views[:, None] - 2 * responses[..., -1] + of_visible
-        return softplus(responses[..., :-1]).sum(dim=2) - squared / 2
+        if self._scaled is None:
+            views = self.scale * views
+        responses = self._responses(views)  # (n, w, units + 1)
+        of_visible = self.learned["visible"].square().sum()
+        squared = energies(views, self._scaled) - 2 * responses[..., -1] + of_visible
+        return (softplus(responses[..., :-1]).sum(dim=2) - squared / 2).float()

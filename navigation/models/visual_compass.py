@@ -18,6 +18,7 @@ class VisualCompass(Model):
 
     name = "visual-compass"
     paper = "Zeil, Hofmann and Chahl 2003"
+    takes_mask = True
     dtypes = {"index": torch.int64}  # noqa: RUF012
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
@@ -32,13 +33,15 @@ class VisualCompass(Model):
             raise SettingError(f"{self.name}: the index of its view is {int(learned['index'])}, not 0 or more")
 
     def _learn(self, views: Images) -> Learned:
-        return {"snapshot": views[-1:].clone(), "index": torch.tensor(len(views) - 1)}
+        return {"snapshot": self._seen(views[-1:]).clone(), "index": torch.tensor(len(views) - 1)}
 
     def _shapes(self, height: int, width: int) -> Shapes:
         return {"snapshot": (1, height, width), "index": ()}
 
     def _prepare(self) -> None:
-        self._memory = PerfectMemory(device=self.device).fit(self.learned["snapshot"])
+        assert self.shape is not None
+        self._memory = PerfectMemory(device=self.device).see(self.mask)
+        self._memory.restore(self.shape, {"snapshots": self.learned["snapshot"]})
 
     def _scan(self, views: Images) -> Scans:
         return self._memory.scan(views)

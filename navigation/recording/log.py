@@ -179,7 +179,8 @@ class Recording:
         self._send("world/path", [step for _, step in walked], rr.LineStrips3D.columns(strips=strips))
         seen = [step for step in steps if step.view is not None]
         if seen:
-            self._send("view", seen, _images(np.stack([step.view for step in seen if step.view is not None])))
+            views = np.stack([step.view for step in seen if step.view is not None])
+            self._send("view", seen, _images(self._renderer.eye.hide(views)))
         self._send_matches([step for step in steps if step.match is not None])
         self._send("deviation/m", steps, rr.Scalars.columns(scalars=[step.deviation for step in steps]))
         self._send("error/degrees", steps, rr.Scalars.columns(scalars=np.degrees([step.error for step in steps])))
@@ -200,7 +201,7 @@ class Recording:
         if not steps or self._training_poses is None:
             return
         poses = self._training_poses[np.array([step.match for step in steps])]
-        self._send("recognised", steps, _images(self._renderer.render(poses)))
+        self._send("recognised", steps, _images(self._renderer.eye.hide(self._renderer.render(poses))))
         arrows = rr.Arrows3D.columns(origins=self._above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
         self._send("world/recognised", steps, arrows)
 

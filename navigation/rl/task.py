@@ -122,7 +122,9 @@ class RouteTask:
 
     def encoded(self, views: UInt8[np.ndarray, "n height width 4"]) -> Observations:
         """What a learner gets of views."""
-        return views[..., :3].copy() if self.chain is None else self.chain(views).numpy()
+        if self.chain is None:
+            return self.eye.hide(views)[..., :3].copy()
+        return self.chain.for_eye(self.eye).seen(views).numpy()
 
 
 class Courses:
@@ -159,7 +161,7 @@ class Courses:
         for seed in {episode.seed for episode in episodes}:
             here = [k for k, episode in enumerate(episodes) if episode.seed == seed]
             views[here] = self[seed].renderer.render([episodes[k].pose for k in here])
-        return self.task.encoded(views), views
+        return self.task.encoded(views), eye.hide(views)
 
     def training_views(self, seed: int, **setup: Any) -> tuple[Observations, Float[np.ndarray, "n 3"]]:
         """What a learner is shown of the route of a seed before it walks, and the poses of these views.
@@ -182,7 +184,8 @@ class Courses:
         if self.task.chain is None:
             return self.task.encoded(course.renderer.render(poses)), poses
         views, kept = training_views(self.task.chain, course.renderer, poses)
-        return views.numpy(), kept
+        mask = self.task.chain.for_eye(self.task.eye).mask
+        return (views if mask is None else mask.images(views)).numpy(), kept
 
 
 class Episode:

@@ -52,10 +52,10 @@ def _draw(row: dict[str, Any], steps: pd.DataFrame, shown: int) -> Iterator[Figu
     pose = np.array([[step["x_m"], step["y_m"], np.radians(step["heading_deg"])]])
     world, route = experiment.open_world_and_route()
     with experiment.open_renderer(world) as renderer:
-        view, match = renderer.render(pose)[0], None
+        view, match = renderer.eye.hide(renderer.render(pose))[0], None
         if isinstance(experiment.model, Spec) and not pd.isna(step["match"]):
             _, learned = training_views(experiment.encoding, renderer, experiment.training_poses(world, route))
-            match = renderer.render(learned[[int(step["match"])]])[0]
+            match = renderer.eye.hide(renderer.render(learned[[int(step["match"])]]))[0]
     yield walk_map(world, route, steps, shown)
     yield view_and_match(view, match)
 

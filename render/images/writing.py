@@ -6,7 +6,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 from jaxtyping import Float
 
@@ -15,6 +14,7 @@ from tussock.world.geometry import Bounds
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
 
+from ..eye import Eye
 from ..poses import Poses
 from ..renderer import Renderer
 from .completing import complete, missing_rows, start_or_resume
@@ -22,6 +22,7 @@ from .database import Database, read_database
 from .entries import FILENAME, HEADING, Columns, X, Y, Z, format_decimal, stored_poses, to_file_units
 
 MAX_VIEWS = 10**6  # of a grid
+MASK_PIECE = 2000  # bytes
 MIN_SPACING = 0.001  # m, because the names of images have whole millimetres
 
 
@@ -147,7 +148,7 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
         "world": hashlib.sha256(scene).hexdigest(),
         "poses": hashlib.sha256(poses.tobytes()).hexdigest(),
         "views": len(poses),
-        "eye": attrs.asdict(eye) | {"samples": eye.rays},
+        "eye": _plain(eye),
     }
     kind = "route" if grid is None else "grid"
     metadata: dict[str, Any] = {"time": time.strftime("%Y-%m-%d %H:%M:%S"), "type": kind}
@@ -156,3 +157,11 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
         metadata["grid"] = {"beginAtMM": begin, "separationMM": [spacing, spacing, 0.0], "size": [*grid.size, 1]}
     camera = {"name": "tussock", "resolution": [eye.width, eye.height], "isPanoramic": 0}
     return metadata | {"camera": camera, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": tussock}
+
+
+def _plain(eye: Eye) -> dict[str, Any]:
+    """The fields of an eye as the metadata holds them: OpenCV reads no text of over 4096 bytes, so that of a mask is cut to pieces."""
+    fields = eye.plain() | {"samples": eye.rays}
+    if eye.mask is None:
+        return fields
+    return fields | {"mask": [eye.mask[start : start + MASK_PIECE] for start in range(0, len(eye.mask), MASK_PIECE)]}
