@@ -7,12 +7,13 @@ from tussock.world.settings import number, settings, switch, whole
 
 
 class StopReason(StrEnum):
-    """Why a walk ends. The first is success."""
+    """Why a walk ends. The first is success; the last but one is of walks over an image database, too far from all its views."""
 
     ARRIVED = "arrived"
     LOST = "lost"
     STUCK = "stuck in a loop"
     OUT_OF_WORLD = "out of the world"
+    OFF_GRID = "off the grid"
     OUT_OF_STEPS = "out of steps"
 
 
@@ -26,8 +27,8 @@ class StoppingRules:
         max_deviation: The agent is lost farther than this from the route (m).
         patience: The agent is stuck after this distance without getting farther along the route (m).
         max_steps: Limit of steps; None means as many as three times the route's length needs.
-        put_back: Instead of ending the walk, put an agent that is lost, stuck or out of the world back on the route, at the waypoint
-            after the furthest one that it reached, facing along the route. Ardin et al. (2016) count errors so.
+        put_back: Instead of ending the walk, put an agent that is lost, stuck, out of the world or off the grid back on the route,
+            at the waypoint after the furthest one that it reached, facing along the route. Ardin et al. (2016) count errors so.
         waypoint_spacing: Distance between waypoints along the route (m).
     """
 

@@ -24,7 +24,7 @@ KEYS = {
     "models": {"models"},
     "run": {
         "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "mean_error_deg", "resets", "cause", "poor_steps", "causes",
-        "seconds", "steps_per_second", "recording",
+        "seconds", "steps_per_second", "recording", "max_view_distance_m",
     },
     "play": {"recording", "screenshot"},
     "sweep": {"table", "runs", "done_before", "arrived", "could_not_run", "seconds", "recordings"},

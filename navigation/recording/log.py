@@ -21,6 +21,7 @@ from tussock.world.scene import World
 
 from ..failures import Cause, Diagnosis
 from ..stopping import StopReason
+from ..training import training_source
 from ..walk import Step
 from .blueprint import CAUSE_COLOURS, TIMELINE, blueprint, cause_entity, image_format
 from .viewer import check_viewer
@@ -199,7 +200,7 @@ class Recording:
         if not steps or self._training_poses is None:
             return
         poses = self._training_poses[np.array([step.match for step in steps])]
-        self._send("recognised", steps, _images(self._renderer.render(poses)))
+        self._send("recognised", steps, _images(training_source(self._renderer).render(poses)))
         arrows = rr.Arrows3D.columns(origins=_above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
         self._send("world/recognised", steps, arrows)
 

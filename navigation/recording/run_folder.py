@@ -58,7 +58,8 @@ def record_run(
         InputError: Where the folder is taken or cannot be written, and for what the experiment refuses.
     """
     out = Path(out)
-    files = [Path(each) for each in (experiment.world, experiment.route) if isinstance(each, str | Path)]
+    given = (experiment.world, experiment.route, experiment.route_database, experiment.grid_database)
+    files = [Path(each) for each in given if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
     with experiment.opened(learning) as trained:
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
