@@ -117,7 +117,7 @@ class Surroundings:
             raise FileError(f"there is no route {self.route}; give a file, or none to have one generated")
 
     def _check_databases(self) -> None:
-        """Refuse databases that are missing, and what contradicts them. Raises InputError."""
+        """Refuse a grid without a route, and what contradicts databases. Raises SettingError."""
         if self.route_database is None:
             raise SettingError(
                 f"{self.grid_database} is a grid without a route; give the image database of a route as well"
@@ -126,11 +126,6 @@ class Surroundings:
         if both := [name for name in OF_WORLDS if getattr(self, name) != fields[name].default]:
             flag = {"route_length": "route-length-m"}.get(both[0], both[0].replace("_", "-"))
             raise SettingError(f"--{flag} is of worlds, and image databases take their place; give one of the two")
-        for folder in (self.route_database, self.grid_database):
-            if folder is not None and not folder.is_dir():
-                raise FileError(
-                    f"there is no image database {folder}; give the folder that holds its entries and images"
-                )
 
     def replace(self: S, **changes: Any) -> S:
         """The same with some fields changed; `body__heading_noise=0.1` changes a field of a field."""
