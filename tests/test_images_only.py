@@ -24,7 +24,7 @@ from tussock.render.images.metadata import METADATA, read_metadata, write_metada
 from tussock.render.images.source import open_views
 from tussock.render.renderer import Renderer, open_renderer
 from tussock.world.errors import FileError, InputError, SettingError
-from tussock.world.geometry import Bounds, Route, turn_of_columns
+from tussock.world.geometry import Bounds, Pose, Route, turn_of_columns
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
@@ -264,7 +264,12 @@ def test_off_the_grid_a_walk_ends(drawn, copies):
     again = experiment.replace(stopping__put_back=True, stopping__max_steps=60).run()
     assert again.summary()["resets"] > 0
     with open_views(*copies) as views, pytest.raises(SettingError, match="no view near the start"):
-        Walk(renderer=views, encoding=experiment.encoding, route=route, starts=[route.goal])
+        Walk(
+            renderer=views,
+            encoding=experiment.encoding,
+            route=route,
+            starts=[Pose(*route.at(0.8 * route.length)[0].tolist())],
+        )
 
 
 def test_in_a_world_no_view_is_far(tmp_path):
