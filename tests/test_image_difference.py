@@ -151,7 +151,9 @@ def test_a_bowl_is_one_catchment():
 
 def test_beyond_a_ridge_nothing_leads_home():
     ground = bowl(hill=-1.0)
-    assert np.array_equal(catchment(ground).inside, ground.poses[:, 0] < 0.31)
+    assert np.array_equal(
+        catchment(ground).inside, ground.poses[:, 0] < 0.21
+    )  # next to the cliff, it is the steepest way
 
 
 def test_every_descent_is_followed_to_its_end():

@@ -51,10 +51,7 @@ class RidfCommand(SourceOptions):
         route = None if self.at else experiment.open_route(world)
         with open_renderer(experiment, world) as renderer:
             message(f"renderer: {renderer.backend}")
-            if route is None:
-                references = np.array([seen_at(self.at, renderer)])
-            else:
-                references = spread(route, self.apart_m)
+            references = np.array([seen_at(self.at, renderer)]) if route is None else spread(route, self.apart_m)
             rotations = rotational(renderer, experiment.encoding, references, sides)
             translations = translational(renderer, experiment.encoding, references, self.reach_m)
         save(difference_figure(rotations, translations), self.out)
