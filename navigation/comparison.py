@@ -15,6 +15,7 @@ from .evaluation import encoded_views, errors_of_views, facing_east
 from .experiment import Experiment
 from .models.base import memory_bytes
 from .stopping import StopReason
+from .tested_poses import route_views_of
 from .training import training_views
 from .walk import check_inside
 
@@ -47,7 +48,7 @@ def compare_models(
     experiment: Experiment,
     renderer: Renderer,
     route: Route,
-    positions: Float[np.ndarray, "n 2"],
+    positions: Float[np.ndarray, "n k"],
 ) -> Iterator[Comparison]:
     """Train and test models, one after the other. Each is made twice: for the headings, and for the walk.
 
@@ -56,7 +57,7 @@ def compare_models(
         experiment: How they are trained, and how they walk.
         renderer: Of the experiment's world, for its eye.
         route: Through it.
-        positions: (n, 2) Where headings are recovered (m).
+        positions: (n, 2) Where headings are recovered, facing east (m); or (n, 3) poses.
     """
     check_inside(experiment.start(route), renderer.world)
     encoding = experiment.encoding
@@ -65,7 +66,7 @@ def compare_models(
         training_views(encoding, renderer, each.training_poses(renderer.world, route))[0]
         for each in (on_route, experiment)
     )
-    route_views, poses = route.resampled(experiment.training.spacing), facing_east(positions)
+    route_views, poses = route_views_of(experiment, route), facing_east(positions)
     views = list(encoded_views(encoding, renderer, poses))
     for spec in models:
         model = experiment.replace(model=spec).make_model()

@@ -86,9 +86,9 @@ def nearest_view(route: Route, positions: Float[np.ndarray, "n 2"]) -> np.ndarra
     return np.hypot(*(positions[:, None] - route.xy).transpose(2, 0, 1)).argmin(axis=1)
 
 
-def facing_east(positions: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
-    """Poses at positions that all face east, so that the right turns do not fall on whole columns by construction."""
-    return np.column_stack([positions, np.zeros(len(positions))])
+def facing_east(positions: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n 3"]:
+    """Poses at positions that all face east, so that the right turns do not fall on whole columns by construction; poses as they are."""
+    return positions if positions.shape[1] == 3 else np.column_stack([positions, np.zeros(len(positions))])
 
 
 def encoded_views(
@@ -130,7 +130,7 @@ def heading_errors(
     encoding: Encoding,
     renderer: Renderer,
     route: Route,
-    positions: Float[np.ndarray, "n 2"],
+    positions: Float[np.ndarray, "n k"],
     *,
     scan: float = 2 * np.pi,
     progress: Progress = no_progress,
@@ -142,13 +142,13 @@ def heading_errors(
         encoding: That of the views it learned.
         renderer: Draws the views at the positions.
         route: Its points are the route views.
-        positions: (n, 2) m.
+        positions: (n, 2) m, where views face east; or (n, 3) poses.
         scan: Full width of the scan (rad), about the right heading where it is not full.
         progress: Called with how many positions are done, of how many.
     """
     poses = facing_east(positions)
     views = encoded_views(encoding, renderer, poses)
-    about = route.poses[nearest_view(route, positions), 2]
+    about = route.poses[nearest_view(route, poses[:, :2]), 2]
     return errors_of_views(model, views, route, poses, scan=scan, about=about, progress=progress)
 
 

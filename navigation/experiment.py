@@ -118,6 +118,8 @@ class Experiment(Surroundings):
 
         super().__attrs_post_init__()
         check_device(self.device)
+        if self.route_database is not None and self.training.spacing != TrainingSetup().spacing:
+            raise SettingError("--spacing-m is of worlds; an image database has its own views: give --every instead")
         if isinstance(self.model, Spec):
             model = self.make_model()  # refuses bad parameters
             if not isinstance(model, FamiliarityModel):
@@ -204,10 +206,13 @@ class Experiment(Surroundings):
         )
 
     def training_poses(self, world: "World", route: "Route"):
-        """(n, 3) Poses that views are learned at; see `tussock.navigation.training.training_poses`."""
-        from .training import training_poses
+        """(n, 3) Poses that views are learned at; see `training_poses` and, for databases, `training_poses_in`."""
+        from .training import training_poses, training_poses_in
 
         setup = self.training
+        if self.route_database is not None:
+            beside = self.open_views_beside()[:, :2]
+            return training_poses_in(route, beside, every=setup.every, learning_walk=setup.learning_walk)
         poses = training_poses(
             route, setup.spacing, every=setup.every, learning_walk=setup.learning_walk, field=world.field
         )

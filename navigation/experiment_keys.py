@@ -32,6 +32,8 @@ ROUTE_SETTINGS = (
     "headings",
     "columns",
     "smooth_m",
+    "route_database",
+    "grid_database",
 )  # decide world and route
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
@@ -66,7 +68,11 @@ def _digest(experiment: Experiment, names: Collection[str]) -> str:
         kept["mask"] = str(experiment.eye.mask)  # its pixels, wherever they were read from
     if experiment.route is not None:
         kept |= {"route": content_of(experiment.route), "route_seed": None, "route_length_m": None}
-    if not (isinstance(experiment.world, str) and is_generated(experiment.world)):
+    databases = {name: getattr(experiment, name) for name in ("route_database", "grid_database")}
+    if experiment.route_database is not None:
+        kept |= {name: content_of(folder) for name, folder in databases.items() if folder is not None}
+        kept |= {"world": None, "world_seed": None, "route_seed": None}
+    elif not (isinstance(experiment.world, str) and is_generated(experiment.world)):
         kept |= {"world": content_of(experiment.world), "world_seed": None}
     return hashlib.sha256(json.dumps([VERSION, kept], default=str).encode()).hexdigest()[:16]
 

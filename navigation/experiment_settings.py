@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 # `experiment_of` and `settings_of`; and a flag of `RunOptions` in cli/options.py. It is part of the key of a run from then on, so
 # no runs are added to earlier folders of sweeps.
 TYPES: dict[str, Any] = {
-    "world": str, "world_seed": int | None, "up": str, "unit": str, "scale": float | None, "strict": bool,
+    "world": str | None, "world_seed": int | None, "up": str, "unit": str, "scale": float | None, "strict": bool,
     "ground": str, "max_slope_deg": float,
     "seed": int, "size": str | None, "renderer": str, "samples": int | None,
     "eye_height_m": float, "top_deg": float, "bottom_deg": float, "field_deg": float | None, "mask": str | None,
@@ -45,6 +45,7 @@ TYPES: dict[str, Any] = {
     "spacing_m": float, "every": int, "learning_walk_m": float, "device": str, "model": str, "threads": int | None, "step_m": float,
     "offset_m": float, "heading_noise_deg": float, "scan_deg": float | None, "scan_about_deg": float | None, "on_lost": str,
     "waypoint_m": float, "arrive_m": float, "lost_m": float, "patience_m": float, "max_steps": int | None, "navigator": str,
+    "route_database": Path | None, "grid_database": Path | None,
 }  # fmt: skip
 
 
@@ -89,7 +90,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     scans = navigator.name == "scan"
     width, about = (parameters.pop("width", math.pi), parameters.pop("about", None)) if scans else (None, None)
     return {
-        "world": _source(experiment.world, "world"),
+        "world": None if experiment.route_database is not None else _source(experiment.world, "world"),
         "world_seed": experiment.world_seed,
         "up": reading.up,
         "unit": reading.unit,
@@ -134,6 +135,8 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "patience_m": stopping.patience,
         "max_steps": stopping.max_steps,
         "navigator": str(dataclasses.replace(navigator, parameters=parameters)),
+        "route_database": None if experiment.route_database is None else str(experiment.route_database),
+        "grid_database": None if experiment.grid_database is None else str(experiment.grid_database),
     }
 
 
@@ -204,19 +207,32 @@ def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]
         "renderer",
         "threads",
     )
-    fields = {name: given[name] for name in names if name in given}
+    databases = {name: Path(given[name]) for name in ("route_database", "grid_database") if name in given}
+    if databases and "world" in given:
+        raise SettingError(
+            "--world and image databases: give one of the two, because the images take the place of a world"
+        )
+    fields: dict[str, Any] = {name: given[name] for name in names if name in given} | databases
     fields["reading"] = MeshReading(**_values(given, up="up", unit="unit", scale="scale", strict="strict"))
-    values = _values(given, route_length="route_length_m", max_slope="max_slope_deg", smooth="smooth_m")
-    return fields | values | {"eye": _eye(given, known)}
+    fields |= _values(given, route_length="route_length_m", max_slope="max_slope_deg", smooth="smooth_m")
+    Surroundings(**fields)  # refuses databases that are not there, before they are asked for their eye
+    return fields | {"eye": _eye(given, known, **databases)}
 
 
-def _eye(given: Mapping[str, Any], known: Eye | None) -> Eye:
+def _eye(
+    given: Mapping[str, Any], known: Eye | None, route_database: Path | None = None, grid_database: Path | None = None
+) -> Eye:
     size = given.get("size") or (f"{known.width}x{known.height}" if known is not None else None)
     pixels = {} if size is None else dict(zip(("width", "height"), width_and_height(size), strict=True))
-    seen = {} if known is None else {"field": known.field, "mask": known.mask}
-    seen |= _values(given, field="field_deg", mask="mask")
     names = {"samples": "samples", "z": "eye_height_m", "top": "top_deg", "bottom": "bottom_deg"}
-    eye = Eye(**pixels, **_values(given, **names), **seen)
+    fields = pixels if known is None else pixels | {"field": known.field, "mask": known.mask}
+    fields |= _values(given, **names, field="field_deg", mask="mask")
+    if route_database is None:
+        eye = Eye(**fields)
+    else:
+        from tussock.render.images.folders import eye_of
+
+        eye = eye_of(route_database, grid_database, fields)
     if known is not None and eye != known:
         raise SettingError(
             f"{given['model']} learned through another eye ({known}) than is asked for ({eye}); "
@@ -285,11 +301,15 @@ def _source(source: Any, kind: str) -> str:
 
 
 def content_of(source: Any) -> str:
-    """Digest of a file, or of an object in memory."""
+    """Digest of a file, of an image database, or of an object in memory."""
     if not isinstance(source, str | Path):
         import joblib
 
         return str(joblib.hash([getattr(source, each.name) for each in dataclasses.fields(source)]))
+    if Path(source).is_dir():
+        from tussock.render.images.folders import digest_of
+
+        return digest_of(Path(source))
     status = Path(source).stat()
     return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
 

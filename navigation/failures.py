@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from tussock.render.images.source import DatabaseViews
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
 from tussock.world.geometry import Pose, Route, columns_of_turn, wrap_angle
@@ -50,14 +51,15 @@ class Diagnosis:
     """What is measured at a poor or failed step.
 
     Attributes:
-        covered: Share of the view, 0 to 1, in which an object is nearer than OCCLUDER_DISTANCE.
+        covered: Share of the view, 0 to 1, in which an object is nearer than OCCLUDER_DISTANCE; None where views are images, which do
+            not show how near things are.
         nearest: Distance from the nearest pose at which a view was learned (m); None where these are not known.
         recognised: Distance from the pose of the learned view that was recognised at the chosen heading (m); None likewise.
         error: Angle between the chosen heading and the route's (rad, -pi..pi).
         turning: How much the route turns within CHORD before and after (rad, 0..pi).
     """
 
-    covered: float
+    covered: float | None
     nearest: float | None
     recognised: float | None
     error: float
@@ -66,7 +68,7 @@ class Diagnosis:
     @property
     def cause(self) -> Cause:
         """The cause that the measurements point to: first what makes a view useless, last what only misleads."""
-        if self.covered > MAX_COVERED:
+        if self.covered is not None and self.covered > MAX_COVERED:
             return Cause.OCCLUSION
         if self.nearest is not None and self.nearest > CATCHMENT:
             return Cause.OFF_CATCHMENT
@@ -82,7 +84,7 @@ class Diagnosis:
         """The cause, and the measurement that points to it."""
         off = f"the heading is {abs(np.degrees(self.error)):.0f} degrees off the route's"
         measured = {
-            Cause.OCCLUSION: f"objects within {100 * OCCLUDER_DISTANCE:g} cm cover {self.covered:.0%} of the view",
+            Cause.OCCLUSION: f"objects within {100 * OCCLUDER_DISTANCE:g} cm cover {self.covered or 0:.0%} of the view",
             Cause.OFF_CATCHMENT: f"the nearest learned view is {self.nearest or 0:.2f} m away",
             Cause.ALIASING: f"the view it recognises was learned {self.recognised or 0:.2f} m away",
             Cause.UNLEARNED: off,
@@ -120,7 +122,7 @@ class Diagnostics:
         if step.failure is None and (abs(step.error) <= POOR or abs(self._off_the_way_back(step)) <= POOR):
             return None
         return Diagnosis(
-            covered=covered_within(self._renderer.world, self._renderer.eye, step.pose, OCCLUDER_DISTANCE),
+            covered=self._covered(step.pose),
             nearest=self._nearest(step.pose),
             recognised=self._recognised(step),
             error=step.error,
@@ -131,6 +133,11 @@ class Diagnostics:
         """Angle between the chosen heading and the point of the route AHEAD of the nearest one (rad)."""
         x, y, _ = self._route.at(step.along + AHEAD)[0]
         return float(wrap_angle(step.pose.heading + step.turn - np.arctan2(y - step.pose.y, x - step.pose.x)))
+
+    def _covered(self, pose: Pose) -> float | None:
+        if isinstance(self._renderer, DatabaseViews):
+            return None
+        return covered_within(self._renderer.world, self._renderer.eye, pose, OCCLUDER_DISTANCE)
 
     def _nearest(self, pose: Pose) -> float | None:
         if self._learned is None:

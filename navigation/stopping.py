@@ -7,7 +7,7 @@ from tussock.world.settings import number, settings, switch, whole
 
 
 class StopReason(StrEnum):
-    """Why a walk ends. The first is success."""
+    """Why a walk ends. The first is success; the last but one is of walks over an image database, too far from all its views."""
 
     ARRIVED = "arrived"
     LOST = "lost"
@@ -15,6 +15,7 @@ class StopReason(StrEnum):
     OUT_OF_WORLD = "out of the world"
     OFF_GROUND = "off the ground"
     TOO_STEEP = "too steep"
+    OFF_GRID = "off the grid"
     OUT_OF_STEPS = "out of steps"
 
 
@@ -28,8 +29,9 @@ class StoppingRules:
         max_deviation: The agent is lost farther than this from the route (m).
         patience: The agent is stuck after this distance without getting farther along the route (m).
         max_steps: Limit of steps; None means as many as three times the route's length needs.
-        put_back: Instead of ending the walk, put an agent that is lost, stuck, out of the world or stopped by the ground back on the
-            route, at the waypoint after the furthest one that it reached, facing along the route. Ardin et al. (2016) count errors so.
+        put_back: Instead of ending the walk, put an agent that is lost, stuck, out of the world, stopped by the ground or off the grid
+            back on the route, at the waypoint after the furthest one that it reached, facing along the route. Ardin et al. (2016)
+            count errors so.
         waypoint_spacing: Distance between waypoints along the route (m).
     """
 

@@ -1,4 +1,4 @@
-"""Where an experiment takes place: a world, a route through it, and the eye that sees it. Light to import."""
+"""Where an experiment takes place: a world or image databases, a route, and the eye that sees them. Light to import."""
 
 import dataclasses
 import math
@@ -15,6 +15,9 @@ from tussock.world.mesh_reading import MeshReading
 from tussock.world.settings import choice, instance_of, number, settings, switch, text, whole
 
 if TYPE_CHECKING:
+    import numpy as np
+    from jaxtyping import Float
+
     from tussock.render.renderer import Renderer
     from tussock.world.geometry import Route
     from tussock.world.scene import World
@@ -23,6 +26,19 @@ S = TypeVar("S", bound="Surroundings")
 
 BACKENDS = ("auto", "cpu", "egl", "osmesa")
 GROUNDS = ("flat", "mesh")
+OF_WORLDS = (
+    "world",
+    "world_seed",
+    "reading",
+    "ground",
+    "cull_back_faces",
+    "route",
+    "route_seed",
+    "route_length",
+    "columns",
+    "smooth",
+    "renderer",
+)  # not of databases
 
 
 def _world(value: Any) -> Any:
@@ -50,9 +66,23 @@ def _route(value: Any) -> Any:
     return value
 
 
+def _folder(value: Any) -> Any:
+    """The folder of an image database as its path."""
+    return value if value is None else Path(value)
+
+
+def _eye(surroundings: "Surroundings") -> Eye:
+    """The eye that saw the images of the databases; without them, the default one."""
+    if surroundings.route_database is None:
+        return Eye()
+    from tussock.render.images.folders import eye_of
+
+    return eye_of(surroundings.route_database, surroundings.grid_database)
+
+
 @settings
 class Surroundings:
-    """A world, a route through it, and the eye that sees it.
+    """A world and a route through it, or image databases of a route and of the views around it; and the eye that sees them.
 
     Attributes:
         world: A preset's name (parameters may follow it), a file, or a `World`.
@@ -64,10 +94,13 @@ class Surroundings:
         route: A `Route`, its file, or None to generate one. It may be in the coordinates of the world's file; see `World.origin_m`.
         route_seed: Of a generated route; None means `seed`.
         route_length: Of a generated route (m).
-        headings: How the headings of a route's file are meant; "auto" reads and checks them. See `read_route`.
+        headings: How the headings of a route's file, or of image databases, are meant; "auto" reads and checks them. See `read_route`.
         columns: Names of the columns of a route's file, as "x [mm],y [mm],-,heading"; None takes its own.
         smooth: Positions of a route's file are averaged along the path with a window of this standard deviation (m); 0 is none.
-        eye: What part of the sphere is seen, and how finely.
+        route_database: Folder of an image database of a route, in place of a world and a route.
+        grid_database: Folder of an image database of the views around that route, which agents see: the one nearest to them. None:
+            they see those of the route.
+        eye: What part of the sphere is seen, and how finely. Default: that of the databases, or `Eye()`.
         seed: Of everything random: world and route where they are generated, and, in an experiment, the model's start and the noise.
         renderer: "auto", "cpu", "egl" or "osmesa".
         threads: To draw with, and, in an experiment, to learn and compare with; None means one for each core.
@@ -85,18 +118,34 @@ class Surroundings:
     headings: str = choice("auto", HEADINGS)
     columns: str | None = text(None, optional=True)
     smooth: float = number(0.0, low=0, unit="m")
-    eye: Eye = instance_of(Eye, attrs.Factory(Eye), "an Eye")
+    route_database: Path | None = attrs.field(default=None, converter=_folder)
+    grid_database: Path | None = attrs.field(default=None, converter=_folder)
+    eye: Eye = instance_of(Eye, attrs.Factory(_eye, takes_self=True), "an Eye")
     seed: int = whole(0, low=0)
     renderer: str = choice("auto", BACKENDS)
     threads: int | None = whole(None, high=4096, optional=True)
 
     def __attrs_post_init__(self):
+        if self.route_database is not None or self.grid_database is not None:
+            self._check_databases()
+            return
         if isinstance(self.world, str):
             from tussock.world.files import check_world
 
             check_world(self.world)
         if isinstance(self.route, Path) and not self.route.is_file():
             raise FileError(f"there is no route {self.route}; give a file, or none to have one generated")
+
+    def _check_databases(self) -> None:
+        """Refuse a grid without a route, and what contradicts databases. Raises SettingError."""
+        if self.route_database is None:
+            raise SettingError(
+                f"{self.grid_database} is a grid without a route; give the image database of a route as well"
+            )
+        fields = attrs.fields_dict(type(self))
+        if both := [name for name in OF_WORLDS if getattr(self, name) != fields[name].default]:
+            flag = {"route_length": "route-length-m"}.get(both[0], both[0].replace("_", "-"))
+            raise SettingError(f"--{flag} is of worlds, and image databases take their place; give one of the two")
 
     def replace(self: S, **changes: Any) -> S:
         """The same with some fields changed; `body__heading_noise=0.1` changes a field of a field."""
@@ -109,7 +158,14 @@ class Surroundings:
         return attrs.evolve(self, **changes)
 
     def open_world(self) -> "World":
-        """The world. Raises InputError where its file cannot be read, or where an axis or a unit is given without a file."""
+        """The world; that of databases has no triangles.
+
+        Raises InputError where its file cannot be read, or where an axis or a unit is given without a file.
+        """
+        if self.route_database is not None:
+            from tussock.render.images.folders import world_of
+
+            return world_of(self.route_database, self.grid_database)
         from tussock.world.files import open_world
         from tussock.world.ground_check import remark_on_ground
         from tussock.world.params import is_generated
@@ -127,7 +183,11 @@ class Surroundings:
         return world
 
     def open_route(self, world: "World") -> "Route":
-        """The route through the world. Raises InputError where it leaves the world, or where none is found."""
+        """The route through the world, or that of the database. Raises InputError where it leaves the world, or where none is found."""
+        if self.route_database is not None:
+            from tussock.render.images.folders import route_of
+
+            return route_of(self.route_database)
         from tussock.world.geometry import Route
         from tussock.world.origin import local_route
         from tussock.world.route_files import read_route
@@ -151,7 +211,21 @@ class Surroundings:
         return world, self.open_route(world)
 
     def open_renderer(self, world: "World") -> "Renderer":
-        """A renderer of the world for the eye; use it in a `with` statement."""
+        """A renderer of the world for the eye, or the views of the databases; use it in a `with` statement."""
+        if self.route_database is not None:
+            from tussock.render.images.source import open_views
+
+            return open_views(self.route_database, self.grid_database, self.eye)
         from tussock.render.renderer import open_renderer
 
         return open_renderer(world, self.eye, self.renderer, threads=self.threads)
+
+    def open_views_beside(self) -> "Float[np.ndarray, 'k 3']":
+        """Poses of the views of the grid database (m, m, rad); none where there is no such database."""
+        import numpy as np
+
+        if self.grid_database is None:
+            return np.empty((0, 3))
+        from tussock.render.images.folders import open_database
+
+        return open_database(self.grid_database).poses

@@ -1,9 +1,13 @@
 """Learning a route: where training views are taken, and giving them to what learns."""
 
+import logging
+from functools import cache
+
 import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
+from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Route, wrap_angle
@@ -13,6 +17,8 @@ from .encoding import Encoding
 from .feature_mask import seeing
 from .models.base import FamiliarityModel
 from .models.files import TrainedModel
+
+log = logging.getLogger(__name__)
 
 AHEAD = 0.3  # m; a view next to the route faces the route this far ahead
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
@@ -61,6 +67,48 @@ def training_poses(
     return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
 
 
+def training_poses_in(
+    route: Route, beside: Float[np.ndarray, "k 2"], *, every: int = 1, learning_walk: float = 0.0
+) -> Float[np.ndarray, "n 3"]:
+    """Poses to learn from where there are views at some poses only, as in image databases.
+
+    As `training_poses`, but on the route at its own points, and next to it at the positions of the other views: all that are within
+    the reach of the learning walk. Those face the point of the route AHEAD of their nearest one.
+
+    Args:
+        route: The route; its points are where its views are.
+        beside: Positions of the other views (m).
+        every: Learn every N-th view of the route.
+        learning_walk: Reach of the learning walk (m); 0 is training on the route only.
+
+    Returns:
+        (n, 3) Poses in the order of the route; the last one is on the route.
+    """
+    poses, arc = route.poses[::every], route.arc[::every]
+    if learning_walk and len(beside) == 0:
+        _remark_on_learning_walk()
+    if learning_walk == 0 or len(beside) == 0:
+        return poses
+    distance, along = route.nearest(beside)
+    near = (distance <= learning_walk) & (along <= arc[-1])
+    aim = route.at(along[near] + AHEAD)[:, :2] - beside[near]
+    facing = np.column_stack([beside[near], np.arctan2(aim[:, 1], aim[:, 0])])
+    order = np.argsort(np.concatenate([along[near], arc]), kind="stable")  # so that of equals, the route's own is last
+    return np.concatenate([facing, poses])[order]
+
+
+@cache  # once, however many models learn
+def _remark_on_learning_walk() -> None:
+    log.warning(
+        "there are no views beside the route, so those on the route are learned and no learning walk; give --grid-database for one"
+    )
+
+
+def training_source(renderer: Renderer) -> Renderer:
+    """What draws the views to learn: the renderer, or, of image databases, the views of the route and those beside it."""
+    return renderer.training if isinstance(renderer, DatabaseViews) else renderer
+
+
 def training_views(
     encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"], progress: Progress = no_progress
 ) -> tuple[Float32[torch.Tensor, "m h w"], Float[np.ndarray, "m 3"]]:
@@ -74,18 +122,18 @@ def training_views(
 
     Args:
         encoding: What is kept of a view.
-        renderer: Draws the views.
+        renderer: Draws the views; see `training_source`.
         poses: Where they are taken.
         progress: Called after each batch.
 
     Raises:
         SettingError: Where no view is left.
     """
-    images, kept = [], []
+    images, kept, source = [], [], training_source(renderer)
     encoded = encoding.for_eye(renderer.eye)
     for start in range(0, len(poses), BATCH):
         part = poses[start : start + BATCH]
-        batch = encoded(renderer.render(part))
+        batch = encoded(source.render(part))
         pixels = batch.flatten(start_dim=1) if encoded.mask is None else encoded.mask.pixels(batch)
         worth = pixels.std(dim=1, correction=0) > MIN_CONTRAST
         images.append(batch[worth])

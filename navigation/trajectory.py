@@ -20,6 +20,7 @@ from .walk import Step
 COLUMNS = (
     "step", "x_m", "y_m", "z_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
     "match", "place", "reset", "reason", "covered", "nearest_view_m", "recognised_view_m", "turning_deg", "cause",
+    "view_distance_m",
 )  # fmt: skip
 
 
@@ -38,7 +39,7 @@ class Trajectory:
         scanned = None if step.familiarity is None else float(step.familiarity[step.scanned].max())
         heading, turn, error = (float(np.degrees(angle)) for angle in (step.pose.heading, step.turn, step.error))
         row = (step.index, *step.pose[:2], step.height, heading, turn, scanned, step.deviation, step.along, error)
-        row += (step.match, step.progress, step.reset, step.reason, *_measured(diagnosis))
+        row += (step.match, step.progress, step.reset, step.reason, *_measured(diagnosis), step.view_distance)
         self.rows.append(tuple(map(_plain, row)))
 
     def __len__(self) -> int:
@@ -58,7 +59,8 @@ class Trajectory:
 
         Returns:
             arrived, reason, steps, mean_deviation_m, max_deviation_m, mean_error_deg (absolute), resets; cause: why it failed (None
-            where it arrived without a reset); poor_steps: how many were poor or failed; causes: how many for each cause.
+            where it arrived without a reset); poor_steps: how many were poor or failed; causes: how many for each cause;
+            max_view_distance_m: how far the agent was at most from the entry of an image database whose view it saw (None in a world).
             A trajectory without steps has the reason None and None in place of means.
         """
         deviation, errors = np.array(self.column("deviation_m")), np.abs(self.column("error_deg"))
@@ -66,7 +68,7 @@ class Trajectory:
         resets, causes = [value != "" for value in self.column("reset")], self.column("cause")
         failed = [*resets[1:], reason not in (None, StopReason.ARRIVED)]
         counts = Counter(label for label in causes if label)
-        walked = bool(self.rows)
+        walked, views = bool(self.rows), [value for value in self.column("view_distance_m") if value != ""]
         return {
             "arrived": reason == StopReason.ARRIVED,
             "reason": reason,
@@ -77,6 +79,7 @@ class Trajectory:
             "resets": sum(resets),
             "cause": walk_cause(self.column("along_m"), causes, failed) if walked else None,
             "poor_steps": counts.total(),
+            "max_view_distance_m": max(views, default=None),
             "causes": {cause.value: counts[cause] for cause in Cause if counts[cause]},
         }
 
@@ -100,7 +103,7 @@ def _plain(value: Any) -> Any:
 
 
 def _measured(diagnosis: Diagnosis | None) -> tuple:
-    """The last of COLUMNS."""
+    """The columns from `covered` to `cause`."""
     if diagnosis is None:
         return (None,) * 5
     turning = float(np.degrees(diagnosis.turning))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
+from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Pose, Route, place_text, wrap_angle
@@ -31,6 +32,7 @@ RECOVERABLE = (
     StopReason.OUT_OF_WORLD,
     StopReason.OFF_GROUND,
     StopReason.TOO_STEEP,
+    StopReason.OFF_GRID,
 )  # from where an agent can be put back on the route
 
 
@@ -42,13 +44,14 @@ class Step:
         index: 0 for the first look.
         pose: Where the agent stands and faces as it looks.
         height: Of the ground beneath it (m).
-        view: (height, width, 4) What it sees, RGBA; None where it was not drawn.
+        view: (height, width, 4) What it sees, RGBA (RGB where it comes from images without alpha); None where it was not drawn.
         familiarity: (w,) Of every rotation, turned left by 0, 1, .. columns; None where the navigator does not scan.
         scanned: (w,) Which of these rotations the navigator compared; None likewise.
         aim: Turn that the navigator decided on (rad, left positive).
         turn: Turn that the body made: the aim and noise (rad).
         match: Index of the learned view that was recognised; None where the model keeps none.
         progress: Share of the learned sequence, 0 to 1, that the navigator believes to have walked; None where it does not know.
+        view_distance: Distance from the entry of the image database whose view it sees (m); None in a world.
         deviation: Distance from the route (m).
         along: Distance along the route of the point nearest to the agent (m).
         error: Angle from the route's heading there to the agent's new heading (rad, -pi..pi).
@@ -60,13 +63,14 @@ class Step:
     index: int
     pose: Pose
     height: float
-    view: UInt8[np.ndarray, "height width 4"] | None
+    view: UInt8[np.ndarray, "height width channels"] | None
     familiarity: Float32[np.ndarray, " w"] | None
     scanned: Bool[np.ndarray, " w"] | None
     aim: float
     turn: float
     match: int | None
     progress: float | None
+    view_distance: float | None
     deviation: float
     along: float
     error: float
@@ -105,7 +109,7 @@ class Walk:
             noise: What the noise on the turns is drawn from: a generator for each agent, or a seed (agent k takes seed + k).
 
         Raises:
-            SettingError: For a start outside of the world, or off its ground.
+            SettingError: For a start outside of the world, off its ground, or off the grid of an image database.
         """
         self.renderer, self.encoding, self.route = renderer, encoding.for_eye(renderer.eye), route
         self.body, self.stopping = body or Body(), stopping or StoppingRules()
@@ -117,8 +121,13 @@ class Walk:
             else noise
         )
         self.agents = [Walker(self, *each) for each in zip(range(len(starts)), starts, generators, strict=True)]
-        self._views: UInt8[np.ndarray, "n height width 4"] | None = None
+        self.reach = renderer.reach if isinstance(renderer, DatabaseViews) else np.inf
+        self._views: UInt8[np.ndarray, "n height width channels"] | None = None
         self._measure(self.agents)
+        if off := [agent.pose for agent in self.agents if agent.reason is StopReason.OFF_GRID]:
+            raise SettingError(
+                f"the image database has no view near the start ({off[0].x:g}, {off[0].y:g}) m; choose another start, or --offset-m"
+            )
 
     @property
     def walking(self) -> list["Walker"]:
@@ -160,6 +169,8 @@ class Walk:
             deviation, along = self.route.nearest(np.array([agent.pose[:2] for agent in agents]))
             headings = self.route.at(along)[:, 2]
             for agent, *measured in zip(agents, deviation.tolist(), along.tolist(), headings.tolist(), strict=True):
+                if isinstance(self.renderer, DatabaseViews):
+                    agent.view_distance = float(self.renderer.nearest([agent.pose])[1][0])
                 agent.measure(*measured)
 
 
@@ -173,6 +184,7 @@ class Walker:
         self.stop_check = StopCheck(walk.stopping, walk.route, walk.world.field, walk.body.step_length)
         self.index, self.ended = 0, False
         self.reset: StopReason | None = None
+        self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
         self.trodden: tuple[Pose, float] | None = (
             None  # where it stood before its step, and how high; None after being put back
         )
@@ -202,6 +214,8 @@ class Walker:
         """Take in how far it is from the route (m) and along it (m), and the route's heading there (rad)."""
         self.deviation, self.along, self.route_heading = deviation, along, route_heading
         self.reason = self.stop_check.check(self.pose, deviation, along) or self.stopped
+        if self.reason is not StopReason.ARRIVED and (self.view_distance or 0.0) > self.walk.reach:
+            self.reason = StopReason.OFF_GRID
         if self.reason is None and self.index >= self.walk.step_limit:
             self.reason = StopReason.OUT_OF_STEPS
 
@@ -223,6 +237,7 @@ class Walker:
             turn=turn,
             match=None if scan is None or scan.match is None else int(scan.match[row]),
             progress=None if scan is None else scan.progress[row],
+            view_distance=self.view_distance,
             deviation=self.deviation,
             along=self.along,
             error=float(wrap_angle(pose.heading + turn - self.route_heading)),

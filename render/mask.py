@@ -108,7 +108,7 @@ def read_mask(path: Path) -> "Bool[np.ndarray, 'height width']":
         raise FileError(
             f"{path} cannot be read as a picture of a mask ({first_line(error)}); save it as PNG"
         ) from error
-    return (pixels >= MIN_BRIGHT).all(axis=2)
+    return np.asarray((pixels >= MIN_BRIGHT).all(axis=2))
 
 
 def fitted(visible: "Bool[np.ndarray, 'rows columns']", width: int, height: int) -> "Bool[np.ndarray, 'height width']":

@@ -21,10 +21,19 @@ KEYS = {
     },
     "train": {"file", "model", "encoding", "n_views", "memory_bytes", "fit_seconds"},
     "compare": {"encoding", "n_views", "n_positions", "models"},
+    "ridf": {"encoding", "n_references", "rotational", "translational", "figure"},
+    "catchment": {
+        "model", "encoding", "n_positions", "spacing_m", "area_m2", "volume", "reach_m", "descent_within_45", "descent_within_90",
+        "heading_within_45", "heading_within_90", "heading_area_45_m2", "heading_area_90_m2", "figure",
+    },
+    "place": {
+        "encoding", "n_queries", "n_references", "n_recognisable", "precision_recall_area", "recall_at_1", "recall_at_5", "recall_at_10",
+        "median_distance_m", "figure",
+    },
     "models": {"models"},
     "run": {
         "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "mean_error_deg", "resets", "cause", "poor_steps", "causes",
-        "seconds", "steps_per_second", "recording",
+        "seconds", "steps_per_second", "recording", "max_view_distance_m",
     },
     "play": {"recording", "screenshot"},
     "sweep": {"table", "runs", "done_before", "arrived", "could_not_run", "seconds", "recordings"},

@@ -32,6 +32,8 @@ from tussock.navigation.stopping import StoppingRules
 from tussock.navigation.surroundings import BACKENDS, Surroundings
 from tussock.navigation.training_setup import TrainingSetup
 from tussock.render.eye import Eye
+from tussock.render.images import Grid, write_database
+from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError, SettingError
 from tussock.world.files import write_world
 from tussock.world.geometry import Route
@@ -97,6 +99,20 @@ CHAIN = st.sampled_from(
 )
 ENCODINGS = PRESET | CHAIN.map(lambda chain: {"encoding": chain}) | st.just({})
 SETTINGS = st.tuples(st.fixed_dictionaries({}, optional=VALUES), ENCODINGS).map(lambda parts: parts[0] | parts[1])
+OF_DATABASES = (
+    "every",
+    "learning_walk_m",
+    "model",
+    "threads",
+    "step_m",
+    "offset_m",
+    "scan_deg",
+    "max_steps",
+)  # some that go with them
+DATABASES = st.fixed_dictionaries(
+    {"route_database": st.just("views"), "grid_database": st.just("around")},
+    optional={name: VALUES[name] for name in OF_DATABASES},
+)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -106,6 +122,9 @@ def folder(tmp_path_factory):
         patch.chdir(tmp_path_factory.mktemp("folder"))
         Path("route.csv").write_text(ROUTE)
         write_mask(Path("mask.png"), 40)
+        with open_renderer(World.generate("tiny", 0), Eye(width=60, height=12), "cpu") as renderer:
+            write_database("views", renderer, [(1.0 + 0.1 * k, 1.0, 0.0) for k in range(4)])
+            write_database("around", renderer, Grid(begin=(1.0, 1.0), spacing=0.1, size=(2, 2)))
         yield
 
 
@@ -125,7 +144,7 @@ def parsed(arguments: list[str]) -> Any:
 # Settings
 
 
-@given(SETTINGS)
+@given(SETTINGS | DATABASES)
 def test_an_experiment_follows_from_its_settings(given_settings):
     experiment = experiment_of(given_settings)
     settings = settings_of(experiment)
@@ -232,13 +251,16 @@ class Ahead:
 
 
 def test_the_keys_differ_where_a_setting_differs(tmp_path):
-    assert set(OTHER) == set(TYPES) - {"navigator"}
+    assert set(OTHER) == set(TYPES) - {"navigator", "route_database", "grid_database"}
     base = experiment_of({})
     others = {name: experiment_of({name: value}) for name, value in OTHER.items()}
     others["navigator"] = experiment_of({"navigator": f"{__name__}:Ahead"})
-    assert len({key_of(base), *map(key_of, others.values())}) == 1 + len(TYPES)
+    assert len({key_of(base), *map(key_of, others.values())}) == 1 + len(others)
     for key, names in ((route_key, {*ROUTE_SETTINGS, "seed"}), (training_key, set(TYPES) - set(WALK_SETTINGS))):
-        assert {name for name, other in others.items() if key(other) != key(base)} == names
+        assert {name for name, other in others.items() if key(other) != key(base)} == names - {
+            "route_database",
+            "grid_database",
+        }
     # It is the content of a file that counts.
     Path(tmp_path / "route.csv").write_text("x_m,y_m\n0,0\n1,2\n")
     elsewhere = experiment_of({"route": tmp_path / "route.csv"})
@@ -346,7 +368,7 @@ def test_a_path_is_a_file_even_where_it_is_named_like_a_preset(tmp_path, monkeyp
 # The command that repeats a run
 
 
-@given(SETTINGS)
+@given(SETTINGS | DATABASES)
 def test_the_command_of_a_run_repeats_it(given_settings):
     experiment = experiment_of(given_settings)
     program, *arguments = shlex.split(run_command(experiment, "the folder"))

@@ -21,30 +21,30 @@ from .terminal import message, progress, progress_of_parts
 class EvaluateCommand(ModelOptions):
     """Learn a route, then recover the heading at every grid position near it."""
 
-    grid_m: float = 0.2
-    """Positions are the multiples of this in x and y .."""
+    grid_m: float | None = None
+    """Positions are the multiples of this in x and y (default: 0.2), or those of --grid-database .."""
     within_m: float = 0.2
     """.. within this distance of the route."""
     scan_deg: float = 360.0
     """Width of the scan; under 360 it is centred on the right heading."""
 
     def run(self) -> dict[str, Any]:
-        from ..evaluation import grid_positions, heading_errors
+        from ..evaluation import heading_errors
+        from ..tested_poses import poses_to_test, route_views_of
 
         began = time.perf_counter()
         if not 0 < self.scan_deg <= 360:
             raise SettingError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
         experiment = self.experiment()
         world, route = experiment.open_world_and_route()
-        positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
-        positions = positions[world.stands(positions)]
+        positions = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
         with open_renderer(experiment, world) as renderer:
             message(f"renderer: {renderer.backend}")
             with progress("learning", "views") as report:
                 trained = experiment.train(renderer, route, report)
             assert trained.model is not None
             model, encoding = trained.model.model, experiment.encoding
-            views = route.resampled(experiment.training.spacing)
+            views = route_views_of(experiment, route)
             with progress("recovering headings", "positions") as report:
                 scan = math.radians(self.scan_deg)
                 errors = heading_errors(model, encoding, renderer, views, positions, scan=scan, progress=report)
@@ -126,8 +126,8 @@ class CompareCommand(LearningOptions):
     commas inside parentheses separate no names: 'mlp hidden_layer_sizes=(100,50),chain'. A model of your own is package.module:Class."""
     learning_walk_m: float = RunOptions.learning_walk_m
     """Reach of the learning walk before the walk home. Headings are recovered from views on the route alone."""
-    grid_m: float = 0.2
-    """Headings are recovered at the multiples of this in x and y .."""
+    grid_m: float | None = None
+    """Headings are recovered at the multiples of this in x and y (default: 0.2), or where --grid-database has views .."""
     within_m: float = 0.2
     """.. within this distance of the route."""
     offset_m: float = 0.1
@@ -137,8 +137,8 @@ class CompareCommand(LearningOptions):
         from tussock.world.specs import split_list
 
         from ..comparison import compare_models
-        from ..evaluation import grid_positions
         from ..models import MODELS, model_spec
+        from ..tested_poses import poses_to_test
 
         experiment = self.experiment()
         names = list(MODELS.builtin) if self.models == "all" else split_list(self.models)
@@ -146,8 +146,7 @@ class CompareCommand(LearningOptions):
         for spec in specs.values():
             experiment.replace(model=spec)  # refuses bad parameters before the work begins
         world, route = experiment.open_world_and_route()
-        positions = grid_positions(route, grid=self.grid_m, within=self.within_m, field=world.field)
-        positions = positions[world.stands(positions)]
+        positions = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
         rows = {}
         with open_renderer(experiment, world) as renderer, progress("comparing", "models") as report:
             report(0, len(specs))
@@ -198,7 +197,8 @@ class RunCommand(RunOptions):
         from ..recording.run_folder import check_run_folder, record_run
 
         viewer = self.viewer if self.live else None
-        files = [Path(name) for name in (self.world, self.route) if name is not None]
+        given = (self.world, self.route, self.route_database, self.grid_database)
+        files = [Path(name) for name in given if name is not None]
         check_run_folder(self.out, overwrite=self.overwrite, inputs=files, viewer=viewer)
         experiment = self.experiment()
         with progress_of_parts() as report:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import attrs
 import tyro
 
-from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
 from tussock.world.mesh_reading import MeshReading
 
@@ -103,12 +102,12 @@ class ViewOptions(MeshOptions):
     """auto (the fastest here), cpu, egl or osmesa."""
     samples: int | None = None
     """Rays along each side of a pixel. Default: 1 where a pixel is at most a degree wide, else 4."""
-    eye_height_m: float = default(Eye, "z")
-    """Height of the eye above the ground."""
-    top_deg: float = degrees(default(Eye, "top"))
-    """Elevation of a panorama's upper edge."""
-    bottom_deg: float = degrees(default(Eye, "bottom"))
-    """Elevation of its lower edge."""
+    eye_height_m: float | None = None
+    """Height of the eye above the ground. Default: 0.01, or that of image databases."""
+    top_deg: float | None = None
+    """Elevation of a panorama's upper edge. Default: 60, or that of image databases."""
+    bottom_deg: float | None = None
+    """Elevation of its lower edge. Default: -15, or that of image databases."""
     field_deg: float | None = None
     """Horizontal field of view, centred ahead; the rest of the circle is hidden from the model. Default: 360, or the model file's."""
     mask: str | None = None
@@ -148,27 +147,38 @@ class RouteOptions(ViewOptions):
 
 
 @dataclass
-class LearningOptions(RouteOptions):
-    """What is learned along the route."""
+class SourceOptions(RouteOptions):
+    """Where views come from, a world or image databases, and what is kept of them."""
 
+    world: Annotated[str | None, tyro.conf.arg(help=f"{WORLD} Default: {default(Surroundings, 'world')}.")] = None
+    route_database: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Image database of a route, in place of a world and a route: its images are learned. See docs/images-only.md."""
+    grid_database: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Image database of the views around that route: what is seen at a position is the image taken nearest to it."""
     encoding: str | None = None
     """edges (the default), grey or sky; or a chain of steps, such as 'foreground-mask | vertical-edges | resize 6 | normalise'."""
     resize: float | None = None
     """Factor by which a view's width and height are reduced. Default: so that the width is 120."""
     blur: float = 0.0
     """Standard deviation (pixels of the view) of Gaussian smoothing before all else; 0 is none."""
+
+    def experiment(self) -> Experiment:
+        """The experiment that these flags describe. Raises InputError."""
+        return experiment_of(self.settings())
+
+
+@dataclass
+class LearningOptions(SourceOptions):
+    """What is learned along the route."""
+
     spacing_m: float = default(TrainingSetup, "spacing")
-    """Distance between route views."""
+    """Distance between route views; those of an image database are as they are."""
     every: int = default(TrainingSetup, "every")
     """Learn every N-th route view."""
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
     device: str = default(Experiment, "device")
     """Where the model learns and scans: cpu, cuda, or another device of torch's."""
-
-    def experiment(self) -> Experiment:
-        """The experiment that these flags describe. Raises InputError."""
-        return experiment_of(self.settings())
 
 
 @dataclass

@@ -9,6 +9,7 @@ import tyro
 
 from tussock.world.errors import SettingError
 
+from ..experiment_settings import degrees
 from ..training_setup import ROUTE_SPACING
 from .options import RouteOptions, flags_of
 from .terminal import message, progress_of_parts
@@ -127,7 +128,7 @@ class StudyOptions(RouteOptions):
             "World": f"{self.world}, generated" if is_generated(self.world) else self.world,
             "Route": "generated" if self.route is None else str(self.route),
             "Views": f"{eye.width} x {eye.height} pixels, one every {100 * self.spacing_m:g} cm of the route",
-            "Eye": f"{self.eye_height_m:g} m high, from {self.bottom_deg:g} to {self.top_deg:g} degrees{rays}",
+            "Eye": f"{eye.z:g} m high, from {degrees(eye.bottom):g} to {degrees(eye.top):g} degrees{rays}",
         }
 
     def command(self, item: "Item") -> str:

@@ -14,6 +14,7 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float, Int64, UInt8
 
+from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import DiskFullError
 from tussock.world.geometry import Pose, Route, turn_of_columns
@@ -21,11 +22,13 @@ from tussock.world.scene import World
 
 from ..failures import Cause, Diagnosis
 from ..stopping import StopReason
+from ..training import training_source
 from ..walk import Step
 from .blueprint import CAUSE_COLOURS, TIMELINE, blueprint, cause_entity, image_format
 from .viewer import check_viewer
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
+VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
 FLUSH_SECONDS = 0.5  # what a crash may lose of a recording
 MAX_FLUSH_SECONDS = 120.0  # rerun's writer sometimes ends without an answer where the disk is full
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible ..
@@ -133,7 +136,11 @@ class Recording:
         # Normals that all point up light every triangle alike: colours contain their shading already.
         normals = np.tile(np.array([0, 0, 1], dtype=np.float32), (len(corners), 1))
         mesh = rr.Mesh3D(vertex_positions=corners, vertex_colors=np.repeat(rgb, 3, axis=0), vertex_normals=normals)
-        self._log("world/mesh", mesh, static=True)
+        if len(triangles):
+            self._log("world/mesh", mesh, static=True)
+        if isinstance(self._renderer, DatabaseViews):
+            points = self._above(self._renderer.poses[:, :2])
+            self._log("world/views", rr.Points3D(points, colors=VIEW_COLOUR, radii=0.004), static=True)
         line = self._above(route.xy)
         goal = line[-1:]
         self._log("world/route", rr.LineStrips3D([line], colors=ROUTE_COLOUR, radii=0.008), static=True)
@@ -201,7 +208,8 @@ class Recording:
         if not steps or self._training_poses is None:
             return
         poses = self._training_poses[np.array([step.match for step in steps])]
-        self._send("recognised", steps, _images(self._renderer.eye.hide(self._renderer.render(poses))))
+        views = self._renderer.eye.hide(training_source(self._renderer).render(poses))
+        self._send("recognised", steps, _images(views))
         arrows = rr.Arrows3D.columns(origins=self._above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
         self._send("world/recognised", steps, arrows)
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tussock.render.images.source import DatabaseViews
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, MissingDependencyError
 from tussock.world.progress import Progress, no_progress
@@ -58,7 +59,8 @@ def record_run(
         InputError: Where the folder is taken or cannot be written, and for what the experiment refuses.
     """
     out = Path(out)
-    files = [Path(each) for each in (experiment.world, experiment.route) if isinstance(each, str | Path)]
+    given = (experiment.world, experiment.route, experiment.route_database, experiment.grid_database)
+    files = [Path(each) for each in given if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
     with experiment.opened(learning) as trained:
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
@@ -69,7 +71,9 @@ def record_run(
         write_route(trained.route, out / ROUTE)
         deviation = f"{summary['mean_deviation_m']:.3f} m off the route on average"
         title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
-        write_overview(trained.renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, title=title)
+        renderer = trained.renderer
+        views = renderer.poses[:, :2] if isinstance(renderer, DatabaseViews) else None
+        write_overview(renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, views=views, title=title)
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
         partial.write_text(json.dumps(summary | {"settings": settings}, indent=2, default=str) + "\n")

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from tussock.world.geometry import Bounds, Route
 from tussock.world.scene import World
 
-from .drawing import PATH_COLOUR, ROUTE_COLOUR, STYLE, canvas, save_picture
+from .drawing import PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, STYLE, canvas, save_picture
 
 ARROW = 0.16  # m
 MARGIN = 0.35  # m around what a map shows
@@ -29,6 +29,7 @@ def write_overview(
     *,
     route: Route | None = None,
     walk: Float[np.ndarray, "n 2"] | None = None,
+    views: Float[np.ndarray, "k 2"] | None = None,
     title: str = "",
 ) -> None:
     """Write a picture of a world from above.
@@ -38,12 +39,15 @@ def write_overview(
         path: File to write, .png or .svg.
         route: A route through it.
         walk: Positions along an agent's path (m).
+        views: Positions of the views of an image database (m).
         title: Title of the picture.
     """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8, 8.4), layout="constrained")
         axes = figure.add_subplot()
         _draw_world(axes, world)
+        if views is not None:
+            axes.plot(*views.T, ".", color=SOFT_COLOUR, ms=2.5, zorder=0, label="views")
         if route is not None:
             axes.plot(*route.xy.T, color="white", lw=4, alpha=0.6)
             axes.plot(*route.xy.T, color=ROUTE_COLOUR, lw=1.8, label="route")

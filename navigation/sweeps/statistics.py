@@ -82,15 +82,18 @@ def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]
 
 
 def worlds_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
-    """Number of each run's group: its world, or in a world from a file its route."""
-    generated = table["world"].map(is_generated).astype(bool)
+    """Number of each run's group: its world; in a world from a file its route; or its image database of a route."""
+    world, route = table["world"].astype(object), table["route"].astype(object)
+    if "route_database" in table:  # which takes the place of both
+        route = route.where(route.notna(), table["route_database"].astype(object))
+    generated = world.map(lambda name: not pd.isna(name) and is_generated(name)).astype(bool)
     given = table[["world_seed", "route_seed"]].astype(object)
     seeds = given.where(given.notna(), table[["seed", "seed"]].to_numpy(dtype=object))
     columns = {
-        "world": table["world"],
+        "world": world,
         "world_seed": seeds["world_seed"].where(generated),
-        "route": table["route"].mask(generated),
-        "route_seed": seeds["route_seed"].mask(generated | table["route"].notna()),
+        "route": route.mask(generated),
+        "route_seed": seeds["route_seed"].mask(generated | route.notna()),
     }
     groups = pd.DataFrame(columns).groupby(list(columns), dropna=False, sort=False)
     return groups.ngroup().to_numpy()

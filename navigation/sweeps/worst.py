@@ -13,7 +13,7 @@ from tussock.world.specs import Spec
 from ..experiment_settings import TYPES, experiment_of
 from ..failures import Diagnosis
 from ..reports.report import Command, Drawing, Section
-from ..training import training_views
+from ..training import training_source, training_views
 from .figures import view_and_match, walk_map
 from .sweep import WORST
 
@@ -55,7 +55,7 @@ def _draw(row: dict[str, Any], steps: pd.DataFrame, shown: int) -> Iterator[Figu
         view, match = renderer.eye.hide(renderer.render(pose))[0], None
         if isinstance(experiment.model, Spec) and not pd.isna(step["match"]):
             _, learned = training_views(experiment.encoding, renderer, experiment.training_poses(world, route))
-            match = renderer.eye.hide(renderer.render(learned[[int(step["match"])]]))[0]
+            match = renderer.eye.hide(training_source(renderer).render(learned[[int(step["match"])]]))[0]
     yield walk_map(world, route, steps, shown)
     yield view_and_match(view, match)
 
@@ -74,7 +74,7 @@ def describe_evidence(step: pd.Series) -> str | None:
     error, turning = (float(np.radians(known[name])) for name in ("error_deg", "turning_deg"))
     nearest, recognised = known.get("nearest_view_m"), known.get("recognised_view_m")
     return str(
-        Diagnosis(covered=known["covered"], nearest=nearest, recognised=recognised, error=error, turning=turning)
+        Diagnosis(covered=known.get("covered"), nearest=nearest, recognised=recognised, error=error, turning=turning)
     )
 
 

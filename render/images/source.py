@@ -1,0 +1,197 @@
+"""Views out of image databases in place of a renderer: the image nearest to a pose, rolled to its heading.
+
+`open_views(route, grid)` is a `tussock.render.renderer.Renderer`, so whatever looks at a world looks at a database as well.
+"""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int64, UInt8
+from scipy.spatial import KDTree
+
+from tussock.world.errors import FileError, InputError
+from tussock.world.geometry import columns_of_turn, wrap_angle
+from tussock.world.scene import World
+
+from ..eye import Eye
+from ..poses import Poses, as_poses
+from .database import Database
+from .folders import eye_of, first_view, open_database, reach_of, world_of
+
+CACHE_BYTES = (
+    256 * 2**20
+)  # of images that are kept after they were used: an agent stays near an entry for several steps
+SAME_PLACE = 1e-9  # m; entries nearer to each other than this have one position, and the heading decides
+BACKEND = "database"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Entries:
+    """Views of one or several databases, which are not read yet.
+
+    Attributes:
+        databases: The databases.
+        poses: (n, 3) Of all their entries, in their order: x (m), y (m) and the heading that the image faces (rad).
+        rows: (n,) Row of each entry in its database.
+        owners: (n,) Index of its database.
+    """
+
+    databases: tuple[Database, ...]
+    poses: Float[np.ndarray, "n 3"]
+    rows: Int64[np.ndarray, " n"]
+    owners: Int64[np.ndarray, " n"]
+
+    @classmethod
+    def of(cls, databases: Sequence[Database]) -> "Entries":
+        """All entries of databases; of equally near ones, those of the first database are taken."""
+        return cls(
+            databases=tuple(databases),
+            poses=np.concatenate([each.poses for each in databases]),
+            rows=np.concatenate([np.arange(len(each)) for each in databases]),
+            owners=np.concatenate([np.full(len(each), owner) for owner, each in enumerate(databases)]),
+        )
+
+    @cached_property
+    def tree(self) -> KDTree:
+        """The positions."""
+        return KDTree(self.poses[:, :2])
+
+    def nearest(self, poses: Float[np.ndarray, "m 3"]) -> tuple[Int64[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """The entry that is nearest to each pose, and how far away it is (m); at one position, that of the nearest heading."""
+        distance, nearest = self.tree.query(poses[:, :2])
+        found = np.array(nearest, dtype=np.int64)
+        same = self.tree.query_ball_point(poses[:, :2], distance + SAME_PLACE, return_sorted=True)
+        for k, candidates in enumerate(same):
+            if len(candidates) > 1:
+                off = np.abs(wrap_angle(self.poses[candidates, 2] - poses[k, 2]))
+                found[k] = candidates[int(off.argmin())]
+        return found, np.asarray(distance, dtype=np.float64)
+
+
+class DatabaseViews:
+    """The views of image databases at any pose, as a renderer gives them: each is the image of the nearest entry.
+
+    An image shows what is seen facing the heading of its entry. At another heading it is rolled by the turn between the two, in whole
+    columns: the nearest number of them (of two that are equally near, the even one). At the heading of its entry it is
+    the image itself, unchanged.
+
+    Attributes:
+        world: A world without triangles. Its field is the extent of the databases.
+        eye: The eye that saw the images.
+        backend: "database".
+        poses: (n, 3) Of the entries that `render` chooses from.
+        reach: A pose that is farther than this from all entries is off the grid (m): half the diagonal of a cell of a grid, the
+            spacing of a route.
+        training: The views to learn from: those of the route, at its own poses, and those beside it.
+    """
+
+    backend = BACKEND
+
+    def __init__(self, databases: Sequence[Database], eye: Eye, world: World, training: "DatabaseViews | None" = None):
+        """Prepare to show the entries of databases.
+
+        Args:
+            databases: The databases; of equally near entries, those of the first one are taken.
+            eye: The eye that saw them.
+            world: See `world_of`.
+            training: The views to learn from; None: these.
+
+        Raises:
+            FileError: Where the images have another size than the eye.
+        """
+        self.world, self.eye, self.training = world, eye, training or self
+        self._entries = Entries.of(databases)
+        self.poses = self._entries.poses
+        self.reach = max(reach_of(each) for each in databases) * (1 + 1e-6)  # rounding
+        channels = [_check_size(each, eye) for each in databases] + ([] if training is None else [training._channels])
+        self._channels = min(channels)  # alpha is used where all images have it
+        self._kept: OrderedDict[int, UInt8[np.ndarray, "height width channels"]] | None = OrderedDict()
+
+    def nearest(self, poses: Poses) -> tuple[Int64[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """The row in `self.poses` of the entry that is nearest to each pose, and how far away it is (m)."""
+        return self._entries.nearest(as_poses(poses))
+
+    def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width channels"]:
+        """The views at poses.
+
+        Args:
+            poses: (n, 3) x (m), y (m) and heading (rad).
+
+        Returns:
+            (n, height, width, 4) RGBA as a renderer gives it where all images have alpha, else (n, height, width, 3) RGB.
+
+        Raises:
+            InputError: A pose is not finite or too far, an image cannot be read, or the source is closed.
+        """
+        poses = as_poses(poses)
+        rows, _ = self._entries.nearest(poses)
+        images = self._images(rows)
+        turns = wrap_angle(poses[:, 2] - self.poses[rows, 2])
+        columns = np.rint(columns_of_turn(turns, self.eye.width)).astype(int)
+        views = np.empty((len(poses), self.eye.height, self.eye.width, self._channels), dtype=np.uint8)
+        for view, row, roll in zip(views, rows.tolist(), columns.tolist(), strict=True):
+            view[:] = np.roll(images[row], roll, axis=1)
+        return views
+
+    def _images(self, rows: Int64[np.ndarray, " n"]) -> dict[int, UInt8[np.ndarray, "height width channels"]]:
+        """The images of entries, as they are."""
+        if self._kept is None:
+            raise InputError("this source of views is closed; open it again")
+        wanted = np.unique(rows)
+        images = {row: self._kept[row] for row in wanted.tolist() if row in self._kept}
+        missing = wanted[[row not in images for row in wanted.tolist()]]
+        for owner, database in enumerate(self._entries.databases):
+            part = missing[self._entries.owners[missing] == owner]
+            for row, image in zip(part.tolist(), database.views(self._entries.rows[part].tolist()), strict=True):
+                images[row] = image[..., : self._channels]
+        for row, image in images.items():
+            self._kept[row] = image
+            self._kept.move_to_end(row)
+        while len(self._kept) * self.eye.width * self.eye.height * self._channels > CACHE_BYTES:
+            self._kept.popitem(last=False)
+        return images
+
+    def close(self) -> None:
+        """Free the images; the source cannot be used afterwards."""
+        self._kept = None
+        if self.training is not self:
+            self.training.close()
+
+    def __enter__(self) -> "DatabaseViews":
+        return self
+
+    def __exit__(self, kind, error, traceback) -> None:
+        self.close()
+
+
+def open_views(route: Path, grid: Path | None = None, eye: Eye | None = None) -> DatabaseViews:
+    """Open image databases as a source of views, for a `with` statement.
+
+    Args:
+        route: Image database of a route.
+        grid: Image database of the views around it. Its views are those that agents and evaluations see; None: those of the route.
+        eye: The eye that saw the images; None: see `eye_of`.
+
+    Raises:
+        InputError: Where a database cannot be used, or where the two do not fit each other or the eye.
+    """
+    eye = eye_of(route, grid) if eye is None else eye
+    databases = [open_database(each) for each in (route, grid) if each is not None]
+    world = world_of(route, grid)
+    if grid is None:
+        return DatabaseViews(databases, eye, world)
+    return DatabaseViews(databases[1:], eye, world, training=DatabaseViews(databases, eye, world))
+
+
+def _check_size(database: Database, eye: Eye) -> int:
+    """The number of channels of the images of a database. Raises FileError where they have another size than the eye."""
+    height, width, channels = first_view(database).shape
+    if (height, width) != (eye.height, eye.width):
+        raise FileError(
+            f"the images of {database.folder} are {width} x {height}, the eye has {eye.width} x {eye.height}; give those of one size"
+        )
+    return channels
