@@ -142,28 +142,27 @@ TABLES = [
 ]
 
 
-def array_files() -> dict[str, list[bytes]]:
-    """Valid files of arrays, by suffix."""
-    matrix, files = np.column_stack([U, U * U, 45 + U]), {"mat": [], "npy": [], "npz": []}
-    variables = [
-        {"route": matrix},
-        {"s": {"x_mm": U, "y_mm": U * U}, "t": "text"},
-        {"c": np.array([U, "a"], dtype=object), "x": U, "y": U},
-    ]
-    for each in variables:
-        for options in ({}, {"do_compression": True}):
-            stream = io.BytesIO()
-            scipy.io.savemat(stream, each, **options)
-            files["mat"].append(stream.getvalue())
-    for kind, save in (("mat", lambda stream: scipy.io.savemat(stream, variables[0], format="4")), ("npy", lambda stream: np.save(stream, matrix)),
-                       ("npz", lambda stream: np.savez(stream, x=U, y=U)), ("npz", lambda stream: np.savez_compressed(stream, a=matrix))):  # fmt: skip
-        stream = io.BytesIO()
-        save(stream)
-        files[kind].append(stream.getvalue())
-    return files
+def saved(save, *values, **options) -> bytes:
+    """What a function writes to a stream."""
+    stream = io.BytesIO()
+    save(stream, *values, **options)
+    return stream.getvalue()
 
 
-ARRAYS = array_files()
+MATRIX = np.column_stack([U, U * U, 45 + U])
+VARIABLES = [
+    {"route": MATRIX},
+    {"s": {"x_mm": U, "y_mm": U * U}, "t": "text"},
+    {"c": np.array([U, "a"], dtype=object), "x": U, "y": U},
+]
+ARRAYS = {
+    "mat": [
+        saved(scipy.io.savemat, VARIABLES[0], format="4"),
+        *(saved(scipy.io.savemat, each, do_compression=small) for each in VARIABLES for small in (False, True)),
+    ],
+    "npy": [saved(np.save, MATRIX)],
+    "npz": [saved(np.savez, x=U, y=U), saved(np.savez_compressed, a=MATRIX)],
+}
 rows = st.lists(st.tuples(odd_numbers, odd_numbers, odd_numbers), min_size=2, max_size=5)
 
 

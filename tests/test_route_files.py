@@ -259,7 +259,7 @@ def test_jitter_is_measured_and_smoothed(tmp_path, caplog):
     route = read_route(path, smooth=0.04)
     assert not caplog.records
     assert route.length == pytest.approx(Route.through(exact).length, rel=0.01)
-    assert np.hypot(*(route.xy - exact).T)[100:-100].max() < 0.003
+    assert Route.through(exact).nearest(route.xy)[0][100:-100].max() < 0.002
 
 
 def test_smoothing_keeps_straight_lines_and_ends():
