@@ -49,6 +49,21 @@ def test_growth_with_triangles(measure, size, n):
         )
 
 
+@pytest.mark.parametrize("what", ["without textures", "with textures", "with textures with holes"])
+def test_view_with_and_without_textures(measure, what):
+    name, world = worlds.everyday()
+    if what != "without textures":
+        world = worlds.textured(world, holes="holes" in what)
+    poses = worlds.poses_in(world, 32)
+    with open_renderer(world, Eye(), "cpu") as renderer:
+        measure(
+            f"view 720 x 150, {name} {what}, in batches",
+            lambda: renderer.render(poses),
+            items=32,
+            unit="ms a view",
+        )
+
+
 def test_view_by_opengl(measure):
     name, world = worlds.everyday()
     try:

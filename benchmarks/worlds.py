@@ -1,5 +1,6 @@
 """Worlds for the benchmarks."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ from jaxtyping import Float
 
 from tussock.world import Bounds, World
 from tussock.world.files import read_world
+from tussock.world.textures import Texture, Texturing
 
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex" / "world5000_gray.bin"
 
@@ -27,6 +29,16 @@ def blades(n: int) -> World:
     triangles[:, 2, :2], triangles[:, 2, 2] = foot + rng.normal(0, 0.05, (n, 2)), rng.uniform(0.05, 0.5, n)
     rgb = rng.integers(0, 256, (n, 3), dtype=np.uint8)
     return World(triangles=triangles, rgb=rgb, field=Bounds(0, 0, side, side), ground=None, sky_rgb=(200, 220, 255))
+
+
+def textured(world: World, *, holes: bool) -> World:
+    """A world with a picture of 512 x 512 texels on each triangle; with holes, half of it is transparent, in 16 x 16 blocks."""
+    rng, n = np.random.default_rng(0), len(world.triangles)
+    rgba = rng.integers(0, 256, (512, 512, 4), dtype=np.uint8)
+    rgba[..., 3] = 255 * np.kron(rng.integers(0, 2, (32, 32)), np.ones((16, 16))) if holes else 255
+    texture = Texture(rgba=rgba, alpha="mask" if holes else "opaque")
+    uv = rng.uniform(0, 1, (n, 3, 2)).astype(np.float32)
+    return replace(world, texturing=Texturing(textures=(texture,), index=np.zeros(n, np.int32), uv=uv))
 
 
 def poses_in(world: World, n: int, seed: int = 0) -> Float[np.ndarray, "n 3"]:

@@ -20,9 +20,9 @@ def _cross(ax, ay, az, bx, by, bz):
 
 
 @compiled(inline="always")
-def _weights(corners, label, x, y, z, cos, sin):
+def weights_along(corners, label, view, cos, sin):
     """The weights of the corners of a triangle in a column of rays, up to a common factor: three numbers, then three slopes over t."""
-    k = np.uintp(label)
+    k, x, y, z = np.uintp(label), view.x, view.y, view.z
     ax, ay, az = corners[k, 0, 0] - x, corners[k, 0, 1] - y, corners[k, 0, 2] - z
     bx, by, bz = corners[k, 1, 0] - x, corners[k, 1, 1] - y, corners[k, 1, 2] - z
     cx, cy, cz = corners[k, 2, 0] - x, corners[k, 2, 1] - y, corners[k, 2, 2] - z
@@ -57,7 +57,7 @@ def _wrapped(i, n, wrap):
 
 
 @compiled(inline="always")
-def _mixed(texels, at, shift):
+def _mixed(at, shift):
     """A channel (0..255) of the mean of four texels: `at` has their places, and the weights across and down."""
     t0, t1, t2, t3, across, down = at
     upper = (t0 >> shift & 0xFF) * (1.0 - across) + (t1 >> shift & 0xFF) * across
@@ -102,68 +102,59 @@ def _of_corners(corner_colours, label, channel, a, b, c):
     return a * corner_colours[k, 0, channel] + b * corner_colours[k, 1, channel] + c * corner_colours[k, 2, channel]
 
 
-@compiled(error_model="numpy")
-def opaque(lookup, label, weights, t):
-    """Whether a ray meets something on a triangle with a texture, and not a hole in it."""
-    _, index, _, uv, corner_colours, texels, textures, thresholds, _ = lookup
+@compiled(error_model="numpy", inline="always")
+def opaque(uv, corner_colours, texels, textures, thresholds, label, k, weights, t):
+    """Whether a ray meets something on a triangle with texture k, and not a hole in it."""
     a, b, c = _shares(weights, t)
-    k = np.uintp(index[np.uintp(label)])
     u, v = _place(uv, label, a, b, c)
-    alpha = _mixed(texels, _sample(texels, textures, k, u, v), 24)
+    alpha = _mixed(_sample(texels, textures, np.uintp(k), u, v), 24)
     if len(corner_colours):
         alpha *= _of_corners(corner_colours, label, 3, a, b, c) / 255.0
-    return alpha >= thresholds[k]
+    return alpha >= thresholds[np.uintp(k)]
 
 
 @compiled(error_model="numpy", inline="always")
-def _channel(texels, at, has_texture, corner_colours, products, label, channel, a, b, c):
+def _channel(at, has_texture, corner_colours, products, label, channel, a, b, c):
     """A channel of the colour of a ray, 0..255."""
     if len(corner_colours) == 0:
-        return np.int64(_mixed(texels, at, 8 * channel) + 0.5)
+        return np.int64(_mixed(at, 8 * channel) + 0.5)
     corner = np.int64(_of_corners(corner_colours, label, channel, a, b, c) + 0.5)
     if not has_texture:
         return corner
-    return np.int64(products[np.uintp(corner), np.uintp(np.int64(_mixed(texels, at, 8 * channel) + 0.5))])
+    return np.int64(products[np.uintp(corner), np.uintp(np.int64(_mixed(at, 8 * channel) + 0.5))])
 
 
-@compiled(error_model="numpy")
-def _ray_colour(lookup, label, k, weights, t):
+@compiled(error_model="numpy", inline="always")
+def _ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, t):
     """The colour of a ray, packed as `Paint.colours` are."""
-    _, _, _, uv, corner_colours, texels, textures, _, products = lookup
     a, b, c = _shares(weights, t)
     at = np.int64(0), np.int64(0), np.int64(0), np.int64(0), 0.0, 0.0
     if k >= 0:
         u, v = _place(uv, label, a, b, c)
         at = _sample(texels, textures, np.uintp(k), u, v)
-    red = _channel(texels, at, k >= 0, corner_colours, products, label, 0, a, b, c)
-    green = _channel(texels, at, k >= 0, corner_colours, products, label, 1, a, b, c)
-    blue = _channel(texels, at, k >= 0, corner_colours, products, label, 2, a, b, c)
+    red = _channel(at, k >= 0, corner_colours, products, label, 0, a, b, c)
+    green = _channel(at, k >= 0, corner_colours, products, label, 1, a, b, c)
+    blue = _channel(at, k >= 0, corner_colours, products, label, 2, a, b, c)
     return red | green << 16 | blue << 32 | np.int64(255) << 48
-
-
-@compiled(error_model="numpy")
-def column_weights(lookup, label, view, cos, sin):
-    """See `_weights`."""
-    return _weights(lookup[0], label, view.x, view.y, view.z, cos, sin)
 
 
 @compiled(error_model="numpy")
 def colour_rays(lookup, colours, directions, tangents, view, keys):
     """Replace the keys of columns view.start..view.stop-1 by the colours of their rays, packed as `colours` are."""
-    index = lookup[1]
+    corners, index, _, uv, corner_colours, texels, textures, _, products = lookup
     for column in range(view.start, view.stop):
-        cos, sin = directions[0, np.uintp(column)], directions[1, np.uintp(column)]
+        j = np.uintp(column)
         before, weights = np.int64(-1), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for row in range(view.height):
-            label = keys[np.uintp(column), np.uintp(row)] & 0xFFFFFFFF
+            r = np.uintp(row)
+            label = keys[j, r] & 0xFFFFFFFF
             k = np.int64(index[np.uintp(label)])
             if k == PLAIN:
-                colour = colours[np.uintp(label)]
-            else:
-                if label != before:
-                    before, weights = label, column_weights(lookup, label, view, cos, sin)
-                colour = _ray_colour(lookup, label, k, weights, tangents[np.uintp(row)])
-            keys[np.uintp(column), np.uintp(row)] = colour
+                keys[j, r] = colours[np.uintp(label)]
+                continue
+            if label != before:
+                before, weights = label, weights_along(corners, label, view, directions[0, j], directions[1, j])
+            keys[j, r] = _ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, tangents[r])
 
 
 @compiled

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .colour_kernels import average, colour_rays, column_weights, opaque
+from .colour_kernels import average, colour_rays, opaque, weights_along
 from .compile import compiled
 
 LEAF = 32  # triangles in a box of the lowest level; the fastest of 16 to 64
@@ -135,6 +135,8 @@ def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
     """Draw `count` spans of rows, see `_draw`."""
     lows, highs, bases, slopes, first_rows, last_rows = spans[0], spans[1], spans[2], spans[3], spans[4], spans[5]
     pad, height = 1e-6 + _ATAN_ERROR * view.rows_per_rad, view.height
+    if lookup is not None:
+        corners, index, holes, uv, corner_colours, texels, textures, thresholds, _ = lookup
     for s in range(count):  # without branches, so that it is vectorised
         first_rows[s] = np.ceil(_row(highs[s], view) - pad)
         last_rows[s] = np.floor(_row(lows[s], view) + pad)
@@ -148,12 +150,15 @@ def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
         while last >= 0 and tangents[np.uintp(last)] < low:
             last -= 1
         if lookup is not None:  # noqa: SIM102 (numba leaves the inner part out where lookup is None)
-            if lookup[2][np.uintp(label)]:  # it has holes
-                weights = column_weights(lookup, label, view, directions[0, j], directions[1, j])
+            if holes[np.uintp(label)]:
+                k = np.int64(index[np.uintp(label)])
+                weights = weights_along(corners, label, view, directions[0, j], directions[1, j])
                 for row in range(first, last + 1):
                     r = np.uintp(row)
-                    key = _key(base + slope * tangents[r], label)
-                    if key > keys[j, r] and opaque(lookup, label, weights, tangents[r]):
+                    t, key = tangents[r], _key(base + slope * tangents[r], label)
+                    if key > keys[j, r] and opaque(
+                        uv, corner_colours, texels, textures, thresholds, label, k, weights, t
+                    ):
                         keys[j, r] = key
                 continue
         for row in range(first, last + 1):

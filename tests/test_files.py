@@ -348,7 +348,12 @@ def test_a_name_of_neither_is_refused_with_the_presets(tmp_path, monkeypatch, na
 
 def test_worlds_whose_arrays_do_not_fit_are_refused():
     world = random_world(n=5)
-    for change in ({"rgb": world.rgb[:4]}, {"rgb": world.rgb / 255}, {"triangles": world.triangles.astype(float)}):
+    for change in (
+        {"rgb": world.rgb[:4]},
+        {"rgb": world.rgb / 255},
+        {"triangles": world.triangles.astype(float)},
+        {"ground": []},
+    ):
         with pytest.raises((InputError, TypeCheckError)):
             World(**{**vars(world), **change})
     mine = np.zeros((1, 3, 3), dtype=np.float32)

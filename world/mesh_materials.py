@@ -187,7 +187,7 @@ def _warn(coverings: Sequence[_Covering], textures: Sequence[Texture], path: Pat
     """Log what other programs show of the file and the renderers do not, once each."""
     losses = {loss: covering.material.name for covering in reversed(coverings) for loss in covering.material.lost}
     for loss, name in losses.items():
-        log.warning(f"{path}: not drawn: {loss} (material {name!r})")
+        log.warning(f"{path}: not drawn: {loss}" + (f" (material {name!r})" if name else ""))
     alphas = [texture.rgba[..., 3] for texture in textures if texture.alpha == "blend"]
     alphas += [each.colours[..., 3] for each in coverings if each.uv is None and each.material.alpha == "blend"]
     if any(np.mean((alpha > 25) & (alpha < 230)) > 0.1 for alpha in alphas if alpha.size):

@@ -91,6 +91,8 @@ class World:
             raise SettingError(
                 f"triangle {invalid} of the world has a corner that is not finite, or over {MAX_COORDINATE:g} m away; repair the mesh"
             )
+        if not (self.ground is None or isinstance(self.ground, Ground)):
+            raise SettingError(f"the ground of a world is a Ground or None, got {type(self.ground).__name__}")
         if self.texturing is not None and len(self.texturing.index) != n:
             raise SettingError(f"the texturing of a world is of its {n} triangles, got {len(self.texturing.index)}")
         check_colour("the colour of the sky", self.sky_rgb)
