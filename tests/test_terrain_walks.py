@@ -213,6 +213,15 @@ def test_a_route_goes_around_a_hole_and_up_no_cliff():
         assert not in_hole.any()
 
 
+def test_a_route_is_planned_over_what_ground_there_is():
+    """A ring around a large hole, over which a route without a plan would lead."""
+    ground = surface(lambda x, y: 0.1 * x, 0.1)
+    world = mesh_world(ground[np.abs(ground.mean(axis=1)[:, :2] - 3.0).max(axis=1) > 2.2]).on_mesh()
+    for seed in range(3):
+        route = generate_route(world, seed, 5.0)
+        assert np.abs(route.xy - 3.0).max(axis=1).min() > 2.2 + 0.02  # to about a cell of the grid
+
+
 def test_a_route_that_leaves_the_ground_is_refused_with_the_place(tmp_path):
     world = mesh_world(surface(lambda x, y: 0.0, 1.0, 0.0, 4.0), hills() + (0, 5, 3)).on_mesh()
     gap = Route.through(np.array([[2.0, 3.0], [2.0, 6.0]]))  # only between its points
