@@ -10,7 +10,7 @@ import attrs
 
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
-from tussock.world.headings import HEADINGS
+from tussock.world.heading_names import HEADINGS
 from tussock.world.mesh_reading import MeshReading
 from tussock.world.settings import choice, instance_of, number, settings, switch, text, whole
 
@@ -187,7 +187,7 @@ class Surroundings:
         if self.route_database is not None:
             from tussock.render.images.folders import route_of
 
-            return route_of(self.route_database)
+            return route_of(self.route_database, self.headings)
         from tussock.world.geometry import Route
         from tussock.world.origin import local_route
         from tussock.world.route_files import read_route
@@ -215,7 +215,7 @@ class Surroundings:
         if self.route_database is not None:
             from tussock.render.images.source import open_views
 
-            return open_views(self.route_database, self.grid_database, self.eye)
+            return open_views(self.route_database, self.grid_database, self.eye, self.headings)
         from tussock.render.renderer import open_renderer
 
         return open_renderer(world, self.eye, self.renderer, threads=self.threads)
@@ -228,4 +228,4 @@ class Surroundings:
             return np.empty((0, 3))
         from tussock.render.images.folders import open_database
 
-        return open_database(self.grid_database).poses
+        return open_database(self.grid_database, self.headings).poses

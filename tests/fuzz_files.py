@@ -15,7 +15,7 @@ from PIL import Image
 
 from tussock.render import Eye, open_renderer
 from tussock.world.files import read_world, write_world
-from tussock.world.headings import HEADINGS
+from tussock.world.heading_names import HEADINGS
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 

@@ -784,3 +784,24 @@ def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkey
     assert len(lines) == 1, err
     assert re.search(message, lines[0]), lines
     assert os.listdir() == ["file"]
+
+
+def test_rows_that_count_the_frames_of_a_tracker_are_the_frames_of_the_video_in_order(tmp_path, caplog):
+    folder = video_database(tmp_path / "route", frames=(770714, 770724, 770735), total=3)
+    database = read_database(folder)
+    assert database.frames == (0, 1, 2)
+    assert "as many as there are rows" in caplog.text
+    assert np.abs(database.views()[:, 0, 0, 0].astype(int) - [10, 50, 90]).max() <= 3
+    assert "missing-frame" not in {problem.kind for problem in check_database(folder)}
+    other = video_database(tmp_path / "other", frames=(0, 1, 6), total=6)  # only its end is missing
+    assert read_database(other).frames == (0, 1, 6)
+
+
+def test_the_unwrapper_of_a_database_of_a_video_stands_under_image_input(tmp_path):
+    folder = video_database(tmp_path / "route")
+    yaml = (folder / METADATA).read_text()
+    ring = "unwrapper:\n         centre: [ 0.5, 0.5 ]\n         inner: 0.1\n         outer: 0.5\n"
+    (folder / METADATA).write_text(
+        yaml.replace("needsUnwrapping: 0", "needsUnwrapping: 1") + f"   imageInput:\n      {ring}"
+    )
+    assert read_database(folder).views().shape[1:] != (8, 16, 3)

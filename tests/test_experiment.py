@@ -37,7 +37,7 @@ from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError, SettingError
 from tussock.world.files import write_world
 from tussock.world.geometry import Route
-from tussock.world.headings import HEADINGS
+from tussock.world.heading_names import HEADINGS
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import wrap_angle
-from tussock.world.headings import CONVENTIONS, HEADINGS, convert, diagnose, path_directions
+from tussock.world.heading_names import CONVENTION_NAMES, HEADINGS
+from tussock.world.headings import CONVENTIONS, convert, diagnose, path_directions
 
 # What a writer of each convention does with a heading (rad): the number that it writes, as degrees (rad). An oracle of its own.
 WRITTEN = {
@@ -42,6 +43,7 @@ paths = st.builds(
 
 def test_every_convention_has_a_writer():
     assert set(WRITTEN) == set(CONVENTIONS) == set(HEADINGS) - {"auto", "path", "as-is"}
+    assert tuple(CONVENTIONS) == CONVENTION_NAMES
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

@@ -14,6 +14,7 @@ from jaxtyping import Complex, Float
 
 from .errors import SettingError
 from .geometry import wrap_angle
+from .heading_names import HEADINGS
 
 
 class Convention(NamedTuple):
@@ -44,7 +45,6 @@ CONVENTIONS = {
     "backwards": Convention("degrees counter-clockwise from -x (backwards)", lambda angle: angle + np.pi),
     "bearing-backwards": Convention("bearings backwards", lambda angle: 3 * np.pi / 2 - angle, mirrored=True),
 }
-HEADINGS = ("auto", *CONVENTIONS, "path", "as-is")  # how a reader may take the headings of a file
 
 SAME = np.radians(10)  # median angle to the path up to which no other convention is considered
 FIT = np.radians(20)  # .. up to which a convention fits

@@ -11,7 +11,8 @@ from jaxtyping import Float
 from .atomic import replacing
 from .errors import FileError, InputError, SettingError
 from .geometry import Route
-from .headings import HEADINGS, Diagnosis, convert, diagnose, path_directions
+from .heading_names import HEADINGS
+from .headings import Diagnosis, convert, diagnose, path_directions
 from .route_points import Points, read_points
 from .route_smoothing import jitter, smoothed
 

@@ -32,7 +32,7 @@ def from_json(data: dict[str, Any]) -> dict[str, Any]:
         raise FileError(f"written by a newer version ({data['version']})")
     ground = data["ground"]
     return {
-        "ground": ground and Ground(tuple(ground["rgb"]), Bounds(*ground["bounds"])),
+        "ground": None if ground is None else Ground(tuple(ground["rgb"]), Bounds(*ground["bounds"])),
         "sky_rgb": tuple(data["sky_rgb"]),
         "field": Bounds(*data["field"]),
         "double_sided": data["double_sided"],

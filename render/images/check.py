@@ -15,7 +15,7 @@ from tussock.world.errors import FileError
 from tussock.world.geometry import wrap_angle
 from tussock.world.headings import Diagnosis, convert, diagnose
 
-from .database import KINDS, Database, check_video_name, guessed_metadata, is_outside
+from .database import KINDS, Database, check_video_name, frames_of_rows, guessed_metadata, is_outside
 from .entries import ENTRIES, FRAME, is_grid, read_entries
 from .flow import grid_axes_error
 from .inspection import Inspection, Problem, inspected
@@ -66,6 +66,8 @@ def check_database(folder: str | os.PathLike, headings: str = "auto") -> list[Pr
     try:
         if database.frames is not None:
             check_video_name(folder, metadata)
+            video = folder / metadata["videoFile"]
+            database = replace(database, frames=frames_of_rows(video, database.frames))
         inspection = inspected(database)
     except FileError as error:  # about the video
         return [*problems, Problem("unreadable-video", METADATA, str(error))]

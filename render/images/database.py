@@ -24,7 +24,7 @@ from .entries import ENTRIES, Columns, is_grid, read_entries, write_entries
 from .lens_metadata import needs_unwrapping, stated_unwrapping
 from .metadata import METADATA, read_metadata, write_metadata
 from .pictures import Picture, check_exists, read_image
-from .video import frames
+from .video import claimed_frames, frames
 
 log = logging.getLogger(__name__)
 
@@ -165,7 +165,7 @@ def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database
 
     Args:
         folder: The folder.
-        headings: How its headings are meant, one of `tussock.world.headings.HEADINGS`; "auto" and "as-is" are bearings, which the
+        headings: How its headings are meant, one of `tussock.world.heading_names.HEADINGS`; "auto" and "as-is" are bearings, which the
             format has.
 
     Raises:
@@ -187,8 +187,26 @@ def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database
         raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
     if entries.frames is not None:
         check_video_name(folder, metadata)
+        entries = replace(entries, frames=frames_of_rows(folder / metadata["videoFile"], entries.frames))
     database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
     return replace(database, poses=convert(entries.poses, headings, "bearing"))
+
+
+def frames_of_rows(video: Path, numbers: tuple[int, ...]) -> tuple[int, ...]:
+    """The frame of each row. Some recorders write the counter of a tracker into `Frame`; their rows are the frames in order."""
+    try:
+        count = claimed_frames(video)
+    except FileError:  # whoever reads the images is told
+        return numbers
+    if len(numbers) != count or max(numbers) < count:
+        return numbers
+    log.warning(
+        "%s: Frame counts to %d and the video has %d frames, as many as there are rows: the rows are taken as its frames in order",
+        video.parent / ENTRIES,
+        max(numbers),
+        count,
+    )
+    return tuple(range(count))
 
 
 def check_video_name(folder: Path, metadata: dict[str, Any]) -> None:

@@ -14,33 +14,37 @@ from scipy.spatial import KDTree
 
 from tussock.world.errors import FileError, InputError, SettingError, first_line
 from tussock.world.geometry import Bounds, Route
+from tussock.world.headings import diagnose
 from tussock.world.scene import World
 from tussock.world.settings import shown
 
 from ..eye import Eye
-from .check import heading_convention_error
 from .database import Database, read_database
 from .entries import ENTRIES
 from .metadata import METADATA
 
 log = logging.getLogger(__name__)
 
+MASK_SUFFIX = ".png"
 
-def open_database(folder: Path) -> Database:
-    """The database in a folder, with panoramas and complete poses.
+
+def open_database(folder: Path, headings: str = "auto") -> Database:
+    """The database in a folder, with complete poses.
+
+    Args:
+        folder: The folder.
+        headings: How its headings are meant; see `read_database`.
 
     Raises:
         FileError: Where it is damaged, has no entries, or a position or heading is missing.
     """
     stamps = tuple(path.stat().st_mtime_ns if path.is_file() else 0 for path in (folder / ENTRIES, folder / METADATA))
-    return _open_database(folder.absolute(), folder, stamps)
+    return _open_database(folder.absolute(), folder, stamps, headings)
 
 
 @lru_cache(maxsize=16)  # the runs of a sweep name the same few
-def _open_database(absolute: Path, folder: Path, stamps: tuple[int, ...]) -> Database:
-    database = read_database(folder)
-    if database.metadata.get("needsUnwrapping"):
-        raise FileError(f"{folder} holds images that need unwrapping; give panoramas")
+def _open_database(absolute: Path, folder: Path, stamps: tuple[int, ...], headings: str) -> Database:
+    database = read_database(folder, headings)
     if len(database) == 0:
         raise FileError(f"{folder / ENTRIES} lists no images; give a database that has some")
     bad = np.flatnonzero(~np.isfinite(database.poses).all(axis=1))
@@ -107,7 +111,10 @@ def _recorded_eye(database: Database) -> dict[str, Any]:
     try:
         if unknown := recorded.keys() - names:
             raise SettingError(f"unknown field {min(unknown)!r}")
-        eye = Eye(**recorded)
+        fields: dict[str, Any] = dict(recorded)
+        if str(fields.get("mask", "")).endswith(MASK_SUFFIX):  # as database import keeps it
+            fields["mask"] = database.folder / str(fields["mask"])
+        eye = Eye(**fields)
     except (InputError, TypeError) as error:
         raise FileError(
             f"{database.folder / METADATA}: its eye cannot be used ({first_line(error)}); repair it"
@@ -151,20 +158,24 @@ def world_of(route: Path, grid: Path | None = None) -> World:
     )
 
 
-def route_of(folder: Path) -> Route:
-    """The route of a database: its poses, with the headings that are recorded.
+def route_of(folder: Path, headings: str = "auto") -> Route:
+    """The route of a database.
+
+    Args:
+        folder: The folder.
+        headings: How its headings are meant; see `read_database`. "auto" checks them.
 
     Raises:
         FileError: It is not of a route, or its headings are in another convention than that of the format.
     """
-    database = open_database(folder)
+    database = open_database(folder, headings)
     if database.kind != "route":
         raise FileError(f"{folder} is a database of a {database.kind}; give one of a route")
-    problem = heading_convention_error(database.poses)
-    if problem and "would fit" in problem:
-        raise FileError(f"{folder}: {problem}; correct them")
-    if problem:
-        log.warning(f"{folder}: {problem}; they are taken as they are, as headings that each view faces")
+    diagnosis = diagnose(database.poses, "bearing")
+    if headings == "auto" and diagnosis.kind == "convention":
+        raise FileError(f"{folder}: {diagnosis}; {diagnosis.flags}")
+    if headings == "auto" and str(diagnosis):
+        log.warning(f"{folder}: {diagnosis}; they are taken as they are, as headings that each view faces")
     return Route(database.poses)
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Bool
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, SettingError
-from tussock.world.headings import HEADINGS
+from tussock.world.heading_names import HEADINGS
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, choice, number, settings, text, whole
 

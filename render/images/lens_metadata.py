@@ -1,6 +1,7 @@
 """How the metadata of a database says that its images are raw pictures of a panoramic camera, and how to unwrap them.
 
 BoB robotics writes `unwrapper`: the centre as a share of width and height, radii as shares of the height, `offsetDegrees` and `flip`.
+In databases of videos it stands under `imageInput`.
 """
 
 import math
@@ -27,7 +28,8 @@ def needs_unwrapping(metadata: dict[str, Any], height: int, width: int) -> bool:
 
 def stated_unwrapping(metadata: dict[str, Any], height: int, width: int, path: Path) -> Unwrapping:
     """How the metadata says that raw pictures of a size are unwrapped. Raises FileError where it does not, which names its path."""
-    group = metadata.get("unwrapper")
+    above = metadata.get("imageInput")
+    group = metadata.get("unwrapper") or (above.get("unwrapper") if isinstance(above, dict) else None)
     group = group if isinstance(group, dict) else {}
     centre = group.get("centre", group.get("center"))
     radii = [group.get("inner"), group.get("outer")]

@@ -168,19 +168,20 @@ class DatabaseViews:
         self.close()
 
 
-def open_views(route: Path, grid: Path | None = None, eye: Eye | None = None) -> DatabaseViews:
+def open_views(route: Path, grid: Path | None = None, eye: Eye | None = None, headings: str = "auto") -> DatabaseViews:
     """Open image databases as a source of views, for a `with` statement.
 
     Args:
         route: Image database of a route.
         grid: Image database of the views around it. Its views are those that agents and evaluations see; None: those of the route.
         eye: The eye that saw the images; None: see `eye_of`.
+        headings: How the headings of the databases are meant; see `read_database`.
 
     Raises:
         InputError: Where a database cannot be used, or where the two do not fit each other or the eye.
     """
     eye = eye_of(route, grid) if eye is None else eye
-    databases = [open_database(each) for each in (route, grid) if each is not None]
+    databases = [open_database(each, headings) for each in (route, grid) if each is not None]
     world = world_of(route, grid)
     if grid is None:
         return DatabaseViews(databases, eye, world)

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.errors import FileError, InputError, SettingError
-from tussock.world.headings import CONVENTIONS, HEADINGS, convert, diagnose
+from tussock.world.heading_names import HEADINGS
+from tussock.world.headings import CONVENTIONS, convert, diagnose
 from tussock.world.route_columns import LENGTHS, Column, chosen_column, find_columns
 from tussock.world.route_tables import decode
 
@@ -82,7 +83,7 @@ def read_track(
         columns: None finds them by their names. "x=East,heading=Yaw" tells which columns hold what; "x,y,-,filename" names the columns
             in their order, - for others.
         unit: Of positions whose columns do not state it: mm, cm, m, in or ft. None is metres.
-        headings: A name in `tussock.world.headings.HEADINGS`.
+        headings: A name in `tussock.world.heading_names.HEADINGS`.
         along_path: Whether the rows are a path, so that headings can be compared with its direction.
 
     Raises:

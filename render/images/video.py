@@ -61,6 +61,13 @@ def count_frames(path: Path) -> int:
     return count
 
 
+def claimed_frames(path: Path) -> int:
+    """The number of frames that the video claims to have; 0 where it does not. Raises FileError if it is missing or damaged."""
+    with _opened(path) as capture:
+        count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
+    return int(count) if 0 < count < 1e9 else 0
+
+
 def frame_rate(path: Path) -> float | None:
     """Frames a second, as the video says; None where it does not. Raises FileError if it is missing or damaged."""
     with _opened(path) as capture:
