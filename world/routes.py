@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from .errors import InputError, SettingError
 from .generate import seeded
 from .geometry import Bounds, Route, place_text
+from .origin import shown
 from .scene import World
 
 BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
@@ -102,8 +103,9 @@ def check_route(world: World, route: Route) -> None:
     inside = world.field.contains(*route.xy.T)
     if not inside.all():
         x, y = route.xy[~inside][0]
+        local = f", with its origin ({shown(world.origin_m)}) subtracted" if any(world.origin_m) else ""
         raise InputError(
-            f"the route leaves the world ({world.field}) at {place_text(x, y)}; choose a route of this world"
+            f"the route leaves the world ({world.field}) at {place_text(x, y)}{local}; choose a route of this world"
         )
 
 
