@@ -46,6 +46,7 @@ from .world import DiskFullError as DiskFullError
 from .world import FileError as FileError
 from .world import Ground as Ground
 from .world import InputError as InputError
+from .world import MeshReading as MeshReading
 from .world import MissingDependencyError as MissingDependencyError
 from .world import Pose as Pose
 from .world import Route as Route

@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import trimesh
 from commands import KEYS, TUSSOCK, printed, process, process_json, tussock
 
 from tussock.navigation.cli.main import COMMANDS, main
@@ -23,6 +24,7 @@ from tussock.navigation.models.files import load_model
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.files import read_world, write_world
+from tussock.world.mesh_reading import MeshReading
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
@@ -101,6 +103,51 @@ def test_a_world_file_may_have_spaces_and_the_name_of_a_preset_in_its_name(capfd
     for world, picture in (("tiny world.glb", "a.png"), ("tiny", "b.png")):
         printed(capfd, "view", "--world", world, "--seed", 3, "--at", "1,2,90", "--out", picture)
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+
+
+def test_a_mesh_of_another_program_is_read_as_the_flags_say(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    boxes = [
+        trimesh.creation.box(bounds=[(x, 0, y), (x + 80, 300, y + 80)])
+        for x, y in ((0, 0), (2900, 0), (0, -2900), (2900, -2900))
+    ]
+    trimesh.util.concatenate(boxes).export("mm.stl")
+    asked, read = ["view", "--world", "mm.stl", "--size", "60x12", "--out", "v.png"], ["--up", "y", "--unit", "mm"]
+    code, _, err = tussock(capfd, *asked)
+    assert code == 0
+    assert "--unit mm" in err
+    assert "--up y" in err
+    code, _, err = tussock(capfd, *asked, *read, "--at", "1.5,1.5,0", "--strict")
+    assert (code, err) == (0, "renderer: cpu\n")
+    assert tussock(capfd, *asked, "--up", "y", "--scale", "0.001")[0] == 0
+    assert tussock(capfd, "route", "--world", "mm.stl", *read, "--length-m", "1.5", "--out", "r.csv")[0] == 0
+    assert read_world("mm.stl", MeshReading(up="y", unit="mm")).field.contains(*read_route("r.csv").xy.T).all()
+    for flags, words in (
+        (["--unit", "mm", "--scale", "1"], "give one of the two"),
+        (["--unit", "yards"], "one of auto, mm, cm, m, in, ft"),
+        (["--up", "w"], "one of auto, x, y, z"),
+        (["--scale", "0"], "scale is 0"),
+        (["--world", "tiny", "--up", "y"], "is generated"),
+    ):
+        code, _, err = tussock(capfd, *asked, *flags)
+        assert (code, err.count("\n")) == (2, 1)
+        assert words in err
+
+
+def test_places_in_a_world_far_from_0_are_given_as_in_its_file(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    boxes = [
+        trimesh.creation.box(bounds=[(x, y, 0), (x + 0.1, y + 0.1, 0.3)]) for x, y in ((0, 0), (3, 0), (0, 3), (3, 3))
+    ]
+    mesh = trimesh.util.concatenate(boxes)
+    mesh.apply_translation([512_340, 5_638_660, 0])
+    Path("w.obj").write_text(mesh.export(file_type="obj", digits=12))
+    for at, name in (("1.5,1.5,30", "a.png"), ("512341.5,5638661.5,30", "b.png")):
+        assert tussock(capfd, "view", "--world", "w.obj", "--size", "60x12", "--at", at, "--out", name)[0] == 0
+    assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
+    for goal in ("1.5,1.5", "512341.5,5638661.5"):
+        result = printed(capfd, "route", "--world", "w.obj", "--length-m", "1", "--goal", goal)
+        assert result["goal"] == pytest.approx((1.5, 1.5), abs=0.1)
 
 
 def test_routes_of_several_seeds_lead_to_one_goal(capfd, tmp_path):

@@ -49,6 +49,8 @@ def check_world(name: str | os.PathLike) -> None:
     name = os.fspath(name)
     if is_generated(name):
         check_preset(name)
+    elif os.path.isdir(name):
+        raise FileError(f"the world {name!r} is a folder; give the file in it")
     elif not os.path.isfile(name):
         raise FileError(f"there is no world {name!r}; give one of {', '.join(WORLDS.names)}, or a file")
 

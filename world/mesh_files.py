@@ -184,7 +184,7 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
 def _say_far(path: Path, origin: tuple[float, float, float], step: float) -> None:
     """Say that a world is made local. step: between neighbouring numbers as they are stored in its file (m)."""
     log.warning(
-        f"{path}: its coordinates are far from 0, so its origin {shown(np.array(origin))} is subtracted; routes and places may be "
+        f"{path}: its coordinates are far from 0, so its origin {shown(origin)} is subtracted; routes and places may be "
         "given in its own coordinates or with the origin subtracted"
     )
     if step > 0.001:

@@ -5,6 +5,7 @@ The coordinates in the file of a world are its own plus `World.origin_m`.
 
 import logging
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,6 +66,6 @@ def local_route(world: "World", route: "Route", what: str) -> "Route":
     return route if np.array_equal(xy, route.xy) else Route(np.column_stack([xy, route.poses[:, 2]]))
 
 
-def shown(place: Float[np.ndarray, " n"]) -> str:
+def shown(place: Iterable[float]) -> str:
     """A place (m) with all its digits, as it can be given again: "x 500000, y 5638660 m"."""
     return ", ".join(f"{axis} {value:.10g}" for axis, value in zip("xyz", place, strict=False)) + " m"

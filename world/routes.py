@@ -17,6 +17,7 @@ from .errors import InputError, SettingError
 from .generate import seeded
 from .geometry import Bounds, Route, place_text
 from .obstacles import clearance, footprints
+from .origin import shown
 from .scene import World
 
 MIN_CLEARANCE = 0.04  # m from every obstacle
@@ -92,8 +93,9 @@ def check_route(world: World, route: Route) -> None:
     inside = world.field.contains(*route.xy.T)
     if not inside.all():
         x, y = route.xy[~inside][0]
+        local = f", with its origin ({shown(world.origin_m)}) subtracted" if any(world.origin_m) else ""
         raise InputError(
-            f"the route leaves the world ({world.field}) at {place_text(x, y)}; choose a route of this world"
+            f"the route leaves the world ({world.field}) at {place_text(x, y)}{local}; choose a route of this world"
         )
     spacing = max(SPACING, route.length / MAX_CHECKED)
     problem = _first_off_ground(world, route.at(np.arange(0.0, route.length + spacing, spacing))[:, :2])

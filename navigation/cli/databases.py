@@ -58,11 +58,11 @@ class DatabaseGridCommand(ViewOptions):
     def grid(self, field: "Bounds", low: tuple[float, ...] | None, high: tuple[float, ...] | None) -> "Grid":
         """The grid from one corner to the other (m), each by default the published grid's or the field's."""
         from tussock.render.images.writing import Grid, published_grid_area
-        from tussock.world.geometry import Bounds, place_text
+        from tussock.world.geometry import Bounds
 
         for flag, corner in (("--from-m", low), ("--to-m", high)):
             if corner is not None and not field.contains(*corner):
-                raise SettingError(f"{flag} {place_text(*corner)}: that is outside the world ({field})")
+                raise SettingError(f"{flag} {corner[0]:.12g},{corner[1]:.12g}: that is outside the world ({field})")
         usual = published_grid_area(field)
         return Grid.over(Bounds(*(low or usual[:2]), *(high or usual[2:])), self.spacing_m)
 

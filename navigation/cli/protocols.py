@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import tyro
 
 from tussock.world.errors import SettingError
+from tussock.world.mesh_reading import MeshReading
 
-from .options import WORLD, WorkerOptions, flags_of
+from .options import WORLD, MeshOptions, WorkerOptions, flags_of
 from .terminal import message, progress
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class ProtocolCommand(WorkerOptions):
+class ProtocolCommand(WorkerOptions, MeshOptions):
     """Do a published experiment again."""
 
     PROTOCOL: ClassVar[str]
@@ -88,6 +89,8 @@ class ProtocolCommand(WorkerOptions):
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
         routes = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
+        reading = self.reading()
+        routes = [each | {"reading": reading} for each in routes] if reading != MeshReading() else routes
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:
