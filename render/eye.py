@@ -18,7 +18,8 @@ MAX_RAYS = 10**8  # of a panorama; the CPU renderer uses 12 bytes a ray and thre
 
 
 def _mask(value: Any, eye: Any = None) -> Mask | None:
-    return as_mask(value, eye.width, eye.height)
+    sized = isinstance(eye.width, int) and isinstance(eye.height, int)  # else the eye is refused
+    return as_mask(value, eye.width, eye.height) if sized and value is not None else value
 
 
 @settings

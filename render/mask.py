@@ -4,6 +4,7 @@ import base64
 import hashlib
 import os
 import re
+import warnings
 import zlib
 from collections.abc import Sequence
 from functools import lru_cache
@@ -16,7 +17,7 @@ if TYPE_CHECKING:  # the command line reads the defaults of an eye: without nump
     import numpy as np
     from jaxtyping import Bool
 
-MAX_PIXELS = 2**26  # of a picture of a mask
+MAX_PIXELS = 2**24  # of a picture of a mask
 MIN_BRIGHT = 128  # a pixel of a picture that is at least so bright, and so opaque, is visible
 FORM = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4}):([\w=-]*)")
 
@@ -51,11 +52,11 @@ class Mask(str):
         return f"<{self.source or 'mask'}, {self.partition(':')[0]}, {hashlib.sha256(self.encode()).hexdigest()[:8]}>"
 
 
-def as_mask(value: Any, width: int, height: int) -> Mask | None:
+def as_mask(value: Any, width: int, height: int) -> Mask:
     """The mask that a setting means.
 
     Args:
-        value: A mask or its text (also in pieces), a (height, width) bool array, the path of a picture, or None.
+        value: A mask or its text (also in pieces), a (height, width) bool array, or the path of a picture.
         width: Columns of the eye.
         height: Its rows.
 
@@ -65,8 +66,6 @@ def as_mask(value: Any, width: int, height: int) -> Mask | None:
     """
     import numpy as np
 
-    if value is None:
-        return None
     if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(each, str) for each in value):
         value = "".join(value)
     if isinstance(value, np.ndarray):
@@ -95,18 +94,23 @@ def read_mask(path: Path) -> "Bool[np.ndarray, 'height width']":
 
     if not os.path.isfile(path):  # unlike Path.is_file, False for names that are too long
         raise FileError(
-            f"there is no mask {path}; give a picture that is white where the eye sees, black where it does not"
+            f"there is no mask {str(path)!r}; give a picture that is white where the eye sees, black where it does not"
         )
     try:
-        with Image.open(path) as image:
+        with (
+            warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning),
+            Image.open(path) as image,
+        ):
             if image.width * image.height > MAX_PIXELS:
-                raise FileError(f"{path} is {image.width} x {image.height}; give a mask of up to {MAX_PIXELS:,} pixels")
+                raise FileError(
+                    f"{str(path)!r} is {image.width} x {image.height}; give a mask of up to {MAX_PIXELS:,} pixels"
+                )
             pixels = np.asarray(image.convert("RGBA").convert("LA"))
     except FileError:
         raise
     except Exception as error:  # Pillow raises whatever its parsers raise
         raise FileError(
-            f"{path} cannot be read as a picture of a mask ({first_line(error)}); save it as PNG"
+            f"{str(path)!r} cannot be read as a picture of a mask ({first_line(error)}); save it as PNG"
         ) from error
     return np.asarray((pixels >= MIN_BRIGHT).all(axis=2))
 
@@ -119,11 +123,11 @@ def fitted(visible: "Bool[np.ndarray, 'rows columns']", width: int, height: int)
         each = np.arange(pixels)
         return each * of // pixels, -(-(each + 1) * of // pixels)
 
-    hidden = np.zeros((visible.shape[0] + 1, visible.shape[1] + 1), np.int64)
+    hidden: Any = np.zeros((visible.shape[0] + 1, visible.shape[1] + 1), np.int64)
     hidden[1:, 1:] = (~visible).cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
     (top, bottom), (left, right) = edges(height, visible.shape[0]), edges(width, visible.shape[1])
     rows = hidden[bottom] - hidden[top]
-    return np.equal(rows[:, right], rows[:, left])
+    return (rows[:, right] - rows[:, left]).astype(np.int64) == 0
 
 
 @lru_cache(maxsize=64)

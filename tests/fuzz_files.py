@@ -219,6 +219,34 @@ def use_route(data: bytes, kind: str, *how) -> None:
         answer(None, lambda: route.resampled(route.length / 7))
 
 
+def picture(visible: np.ndarray, mode: str, kind: str) -> bytes:
+    """The picture of a mask."""
+    file = io.BytesIO()
+    Image.fromarray(visible.astype(np.uint8) * 255).convert(mode).save(file, kind)
+    return file.getvalue()
+
+
+MASK = np.random.default_rng(0).random((3, 8)) > 0.3
+PICTURES = [picture(MASK, mode, kind) for mode, kind in (("L", "png"), ("RGBA", "png"), ("1", "bmp"), ("P", "gif"))]
+
+
+@holds(120)
+@given(damaged(PICTURES) | st.binary(max_size=60))
+def masks(data):
+    path = FOLDER / "mask.png"
+    path.write_bytes(data)
+    eye = answer(None, lambda: Eye(width=8, height=3, mask=path))
+    if eye is not None:
+        assert Eye(**eye.plain()) == eye
+        assert eye.visible().any()
+
+
+@holds(120)
+@given(damaged([str(Eye(width=8, height=3, mask=MASK).mask).encode()]) | st.binary(max_size=60))
+def texts_of_masks(data):
+    answer(None, lambda: Eye(width=8, height=3, mask=data.decode("latin-1")).visible())
+
+
 if __name__ == "__main__":
     logging.disable()  # remarks on what was assumed
     main()
