@@ -147,6 +147,10 @@ class DatabaseViews:
         for owner, database in enumerate(self._entries.databases):
             part = missing[self._entries.owners[missing] == owner]
             for row, image in zip(part.tolist(), database.views(self._entries.rows[part].tolist()), strict=True):
+                if image.shape[2] < self._channels:
+                    raise FileError(
+                        f"{database.folder}: some of its images have alpha and others none; give images of one kind"
+                    )
                 images[row] = image[..., : self._channels]
         for row, image in images.items():
             self._kept[row] = image
