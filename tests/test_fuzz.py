@@ -28,7 +28,8 @@ LIMIT = 600  # seconds; only a process that hangs takes as long
 
 
 @pytest.mark.parametrize(
-    "file", ["fuzz_files", "fuzz_meshes", "fuzz_textures", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"]
+    "file",
+    ["fuzz_files", "fuzz_meshes", "fuzz_textures", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"],
 )
 def test_any_input_is_used_or_refused(file):
     paths = os.pathsep.join([str(HERE.parent), str(HERE), os.environ.get("PYTHONPATH", "")])

@@ -27,7 +27,7 @@ def node():
 
 def image_message(pixels: np.ndarray, encoding: str, padding: int = 0) -> SimpleNamespace:
     """A sensor_msgs/Image of pixels (height, width, channels), each row followed by unused bytes."""
-    height, width, channels = pixels.shape
+    height, width = pixels.shape[:2]
     rows = np.hstack([pixels.reshape(height, -1), np.full((height, padding), 77, np.uint8)])
     fields = {"height": height, "width": width, "encoding": encoding, "is_bigendian": 0, "step": rows.shape[1]}
     return SimpleNamespace(**fields, data=rows.tobytes())
