@@ -26,19 +26,20 @@ S = TypeVar("S", bound="Surroundings")
 
 BACKENDS = ("auto", "cpu", "egl", "osmesa")
 GROUNDS = ("flat", "mesh")
-OF_WORLDS = (
-    "world",
-    "world_seed",
-    "reading",
-    "ground",
-    "cull_back_faces",
-    "route",
-    "route_seed",
-    "route_length",
-    "columns",
-    "smooth",
-    "renderer",
-)  # not of databases
+OF_WORLDS = {
+    "world": "world",
+    "world_seed": "world-seed",
+    "reading": "up, --unit, --scale or --strict",
+    "ground": "ground",
+    "max_slope": "max-slope-deg",
+    "cull_back_faces": "cull-back-faces",
+    "route": "route",
+    "route_seed": "route-seed",
+    "route_length": "route-length-m",
+    "columns": "columns",
+    "smooth": "smooth-m",
+    "renderer": "renderer",
+}  # fields that databases do not take, and their flags
 
 
 def _world(value: Any) -> Any:
@@ -143,9 +144,12 @@ class Surroundings:
                 f"{self.grid_database} is a grid without a route; give the image database of a route as well"
             )
         fields = attrs.fields_dict(type(self))
-        if both := [name for name in OF_WORLDS if getattr(self, name) != fields[name].default]:
-            flag = {"route_length": "route-length-m"}.get(both[0], both[0].replace("_", "-"))
-            raise SettingError(f"--{flag} is of worlds, and image databases take their place; give one of the two")
+        given = {name: getattr(self, name) for name in OF_WORLDS}
+        usual = {name: fields[name].default for name in OF_WORLDS} | {"reading": MeshReading()}
+        if both := [name for name in OF_WORLDS if given[name] != usual[name]]:
+            raise SettingError(
+                f"--{OF_WORLDS[both[0]]} is of worlds, and image databases take their place; give one of the two"
+            )
 
     def replace(self: S, **changes: Any) -> S:
         """The same with some fields changed; `body__heading_noise=0.1` changes a field of a field."""
