@@ -4,6 +4,7 @@ The format is used at Sussex, Sheffield and Imperial. A row of a route has the b
 was taken facing there.
 """
 
+import dataclasses
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -130,8 +131,8 @@ def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database
     kind = metadata.get("type")
     if kind not in KINDS:
         raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
-    poses = convert(entries.poses, headings, "bearing")
-    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries) | {"poses": poses})
+    entries = dataclasses.replace(entries, poses=convert(entries.poses, headings, "bearing"))
+    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
 
 
 def is_outside(folder: Path, name: str) -> bool:
