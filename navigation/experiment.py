@@ -131,9 +131,7 @@ class Experiment(Surroundings):
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
             if self.eye.masked and not takes(self.navigator.target, "model"):
-                raise SettingError(
-                    f"the navigator {str(self.navigator)!r} takes no model; give an eye without field or mask"
-                )
+                raise SettingError(f"the navigator {str(self.navigator)!r} takes no model; give no field and no mask")
         elif not takes(self.navigator.target, "model"):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"

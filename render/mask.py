@@ -123,11 +123,11 @@ def fitted(visible: "Bool[np.ndarray, 'rows columns']", width: int, height: int)
         each = np.arange(pixels)
         return each * of // pixels, -(-(each + 1) * of // pixels)
 
-    hidden: Any = np.zeros((visible.shape[0] + 1, visible.shape[1] + 1), np.int64)
+    hidden = np.zeros((visible.shape[0] + 1, visible.shape[1] + 1), np.int64)
     hidden[1:, 1:] = (~visible).cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
     (top, bottom), (left, right) = edges(height, visible.shape[0]), edges(width, visible.shape[1])
     rows = hidden[bottom] - hidden[top]
-    return (rows[:, right] - rows[:, left]).astype(np.int64) == 0
+    return rows[:, right] == rows[:, left]
 
 
 @lru_cache(maxsize=64)
