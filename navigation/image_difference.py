@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32
 
+from tussock.render.eye import Eye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
@@ -102,6 +103,14 @@ def differences(
     return np.concatenate(rows)
 
 
+def check_sees_all(eye: Eye) -> None:
+    """Refuse an eye that does not see all around. Raises SettingError."""
+    if eye.masked:
+        raise SettingError(
+            "image differences compare whole views, and this eye has a field of view or a mask; leave --field-deg and --mask out"
+        )
+
+
 def differences_of_places(
     encoding: Encoding,
     renderer: Renderer,
@@ -124,6 +133,7 @@ def differences_of_places(
     Returns:
         The differences, and the poses of the references that show anything (see `training_views`).
     """
+    check_sees_all(renderer.eye)
     views, kept = training_views(encoding, renderer, references)
     rows, done = [], 0
     for batch in encoded_views(encoding, renderer, queries):
@@ -185,6 +195,7 @@ def rotational(
     Raises:
         SettingError: Where no displaced view can be seen.
     """
+    check_sees_all(renderer.eye)
     wanted = encoding(training_source(renderer).render(references))
     results = []
     for displacement in displacements:
@@ -224,6 +235,7 @@ def translational(
         reach: Displacement to both sides (m).
         steps: Number of displaced positions on each side.
     """
+    check_sees_all(renderer.eye)
     wanted = encoding(training_source(renderer).render(references))
     results = {}
     for name, (forward, left) in SIDES.items():

@@ -101,8 +101,10 @@ class DatabaseViews:
             training: The views to learn from; None: these.
 
         Raises:
-            FileError: Where the images have another size than the eye.
+            FileError: Where the images have another size than the eye, or do not show what turning them would bring into view.
         """
+        for each in databases:
+            _check_shows_all(each, eye)
         self.world, self.eye, self.training = world, eye, training or self
         self._entries = Entries.of(databases)
         self.poses = self._entries.poses
@@ -190,6 +192,21 @@ def open_views(route: Path, grid: Path | None = None, eye: Eye | None = None, he
     if grid is None:
         return DatabaseViews(databases, eye, world)
     return DatabaseViews(databases[1:], eye, world, training=DatabaseViews(databases, eye, world))
+
+
+def _check_shows_all(database: Database, eye: Eye) -> None:
+    """Refuse images with parts that are unknown, as behind the body of a robot: turned with the view, they would be taken for the world.
+
+    What tussock drew shows the full circle behind any mask. Rows that are hidden all around stay where they are. Raises FileError.
+    """
+    if eye.mask is None or "world" in database.metadata.get("tussock", {}):
+        return
+    visible = eye.mask.visible()
+    if (visible != visible[:, :1]).any():
+        raise FileError(
+            f"{database.folder}: its mask hides parts that are not the same all around, and what is behind them is not known; import it "
+            "without --mask and with rows that show all around (--top-deg, --bottom-deg)"
+        )
 
 
 def _check_size(database: Database, eye: Eye) -> int:
