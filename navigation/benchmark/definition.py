@@ -38,8 +38,22 @@ BASE = Experiment(
     threads=1,
 )
 ENCODING = "edges"  # of entries that choose none
-# Settings newer than the benchmarks, which are of worlds, on flat ground, and of generated routes.
-LATER = ("ground", "max_slope_deg", "headings", "columns", "smooth_m", "route_database", "grid_database")
+# Settings newer than the benchmarks, which have them all as by default.
+LATER = (
+    "up",
+    "unit",
+    "scale",
+    "strict",
+    "ground",
+    "max_slope_deg",
+    "field_deg",
+    "mask",
+    "headings",
+    "columns",
+    "smooth_m",
+    "route_database",
+    "grid_database",
+)
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
 
 

@@ -242,7 +242,7 @@ def _lattice(mm: np.ndarray) -> tuple[float, float, np.ndarray] | None:
 def _metadata(
     kind: str, lattice: dict[str, Any] | None, eye: Eye, digest: str, views: int, seen: np.ndarray | None
 ) -> dict[str, Any]:
-    stored: dict[str, Any] = attrs.asdict(eye) | {"samples": eye.rays}
+    stored: dict[str, Any] = eye.plain() | {"samples": eye.rays}
     if seen is not None:
         stored["mask"] = MASK
     metadata: dict[str, Any] = {"time": time.strftime("%Y-%m-%d %H:%M:%S"), "type": kind}
