@@ -17,7 +17,7 @@ from .terminal import message, progress
 
 if TYPE_CHECKING:
     from ..studies.protocols import Protocol
-    from ..sweeps.spec import Sweep
+    from ..sweeps.spec import Change, Sweep
 
 
 @dataclass
@@ -88,9 +88,10 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         from ..studies.protocols import routes_in
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
-        routes = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
+        routes: list[Change] = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
         reading = self.reading()
-        routes = [each | {"reading": reading} for each in routes] if reading != MeshReading() else routes
+        if reading != MeshReading():
+            routes = [{**each, "reading": reading} for each in routes]
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:
