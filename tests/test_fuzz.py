@@ -26,7 +26,9 @@ HERE = Path(__file__).parent
 LIMIT = 600  # seconds; only a process that hangs takes as long
 
 
-@pytest.mark.parametrize("file", ["fuzz_files", "fuzz_textures", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"])
+@pytest.mark.parametrize(
+    "file", ["fuzz_files", "fuzz_textures", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"]
+)
 def test_any_input_is_used_or_refused(file):
     paths = os.pathsep.join([str(HERE.parent), str(HERE), os.environ.get("PYTHONPATH", "")])
     run = subprocess.run(
