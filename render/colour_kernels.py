@@ -3,8 +3,6 @@
 The mathematics of textures. A ray `d` meets a triangle (a, b, c), as seen from the eye, at a point that is a weighted mean of its
 corners. So `d ~ w_a a + w_b b + w_c c`, and by Cramer's rule the weights are `w_a = d . (b x c)` and so on around, divided by their
 sum. They are linear in `d`, so within a column of rays (`d = (cos az, sin az, t)`) each is a number plus t times another one.
-
-scanline_kernels.py calls these functions. numba's cache does not notice a change here: touch that file after one.
 """
 
 import numpy as np

@@ -1,15 +1,17 @@
 """Compilation of loops with numba."""
 
+import hashlib
+import inspect
 import logging
 from collections.abc import Callable
 from functools import cache, partial
-from inspect import unwrap
+from types import ModuleType
 from typing import Any
 
 import numba
 
 
-def compiled(function: Callable | None = None, **options: Any) -> Any:
+def compiled(function: Callable | None = None, *, uses: ModuleType | None = None, **options: Any) -> Any:
     """Decorator for a function that numba compiles; other threads run while it works.
 
     The machine code is kept on disk for later processes. Where no folder for it can be written, for example in a read-only
@@ -17,16 +19,20 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
 
     Args:
         function: The function, where the decorator is used without options.
+        uses: Another module whose functions it calls, or the functions that it calls do. numba notices a change in the source of a
+            function's own module only; with this it compiles anew after a change in the other one, too.
         options: Further options of `numba.njit`.
     """
     if function is None:
-        return partial(compiled, **options)
-    function = unwrap(function)  # numba compiles the function itself, not a type checker around it
+        return partial(compiled, uses=uses, **options)
+    bare: Any = inspect.unwrap(function)  # numba compiles the function itself, not a type checker around it
+    if uses is not None:  # what numba keeps is found by this name
+        bare.__qualname__ += "_" + hashlib.sha256(inspect.getsource(uses).encode()).hexdigest()[:12]
     try:
-        return numba.njit(function, nogil=True, cache=True, **options)
+        return numba.njit(bare, nogil=True, cache=True, **options)
     except RuntimeError:  # numba found no folder for its cache
         _warn_without_cache()
-        return numba.njit(function, nogil=True, **options)
+        return numba.njit(bare, nogil=True, **options)
 
 
 @cache

@@ -1,14 +1,15 @@
 """The loops of the CPU renderer. Their mathematics is in scanline.py.
 
-They stand in one file, because numba's cache notices a change in the file of a function, but not in the files of those that it
-calls; colour_kernels.py has what makes colours of their keys. `lookup` is None in a plain world: numba compiles the loops anew for
-it, without the parts for textures. Arrays are passed on one by one, because numba counts the references to each array of a tuple.
+colour_kernels.py has what makes colours of their keys; functions that call it say so, because numba notices a change in the file of a
+function, but not in the files of those that it calls. `lookup` is None in a plain world: numba compiles the loops anew for it, without
+the parts for textures. Arrays are passed on one by one, because numba counts the references to each array of a tuple.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from . import colour_kernels
 from .colour_kernels import average, colour_rays, opaque, weights_along
 from .compile import compiled
 
@@ -130,7 +131,7 @@ def _key(nearness, label):
     return np.int64(np.float32(nearness).view(np.int32)) << 32 | label
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", uses=colour_kernels)
 def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
     """Draw `count` spans of rows, see `_draw`."""
     lows, highs, bases, slopes, first_rows, last_rows = spans[0], spans[1], spans[2], spans[3], spans[4], spans[5]
@@ -216,7 +217,7 @@ def _squared_distance(boxes, k, view):
     return dx * dx + dy * dy
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", uses=colour_kernels)
 def _draw(triangles, directions, tangents, view, keys, lookup):
     """Draw all triangles. Boxes are visited from near to far, so that near ones hide far ones.
 
@@ -268,7 +269,7 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
         _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
 
 
-@compiled
+@compiled(uses=colour_kernels)
 def draw_views(triangles, rays, paint, lookup, poses, start, stop, keys, views):
     """Draw columns start..stop-1 of views.
 

@@ -74,6 +74,30 @@ def test_code_is_compiled_without_a_cache_and_one_warning_says_what_to_set(packa
     assert done.stderr == ""
 
 
+USERS = """
+import used
+from tussock.render.compile import compiled
+
+def plain(x):
+    return used.double(x)
+
+caller = compiled(plain, uses=used)
+print(caller(3))
+"""
+
+
+def test_a_change_in_a_module_that_compiled_code_uses_is_noticed(tmp_path):
+    (tmp_path / "tussock").symlink_to(CLONE)
+    (tmp_path / "caller.py").write_text(USERS)
+    seen = []
+    for factor in (2, 2, 5):
+        used = f"from tussock.render.compile import compiled\n@compiled\ndef double(x):\n    return {factor} * x\n"
+        (tmp_path / "used.py").write_text(used)
+        environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+        seen.append(run_python("import caller", tmp_path, **environment).stdout.strip())
+    assert seen == ["6", "6", "15"]
+
+
 def test_only_one_module_compiles():
     """So that all loops work without a cache."""
     files = [path for room in ("world", "render", "navigation") for path in (CLONE / room).rglob("*.py")]

@@ -24,9 +24,9 @@ def mean_rgb(texturing: Texturing) -> UInt8[np.ndarray, "n 3"]:
 
 def _means(texture: Texture, uv: Float32[np.ndarray, "n 3 2"], side: int) -> UInt8[np.ndarray, "n 3"]:
     """Mean texels over triangles, from side^2 samples of each."""
-    steps = (np.arange(side) + 0.5) / side
-    u, v = (grid.ravel() for grid in np.meshgrid(steps, steps))
-    corner = np.where(u + v > 1, [1 - u, 1 - v], [u, v])  # the square folded onto the triangle
+    i, j = np.indices((side, side)).reshape(2, -1)
+    corner = (np.array([i, j]) + 1 / 3)[:, i + j < side], (np.array([i, j]) + 2 / 3)[:, i + j < side - 1]
+    corner = np.concatenate(corner, axis=1) / side  # the middles of side^2 equal triangles, upright and upside down
     weights = np.stack([1 - corner.sum(axis=0), *corner])  # (3, side^2)
     seen, everything, count = np.zeros((len(uv), 3)), np.zeros((len(uv), 3)), np.zeros((len(uv), 1))
     height, width = texture.rgba.shape[:2]
