@@ -11,8 +11,6 @@ import logging
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +24,7 @@ from tussock.world.specs import Spec, takes
 from .body import Body
 from .stopping import StoppingRules
 from .surroundings import Surroundings
+from .trained_navigator import TrainedNavigator
 from .training_setup import TrainingSetup
 
 if TYPE_CHECKING:
@@ -34,10 +33,9 @@ if TYPE_CHECKING:
     from tussock.world.scene import World
 
     from .encoding import Encoding
-    from .failures import Diagnosis, Diagnostics
+    from .failures import Diagnosis
     from .models.base import FamiliarityModel
     from .models.files import TrainedModel
-    from .steering.navigator import Navigator
     from .trajectory import Trajectory
     from .walk import Step, Walk
 
@@ -275,31 +273,3 @@ class Experiment(Surroundings):
                 trajectory.add(step, diagnosis)
                 progress(step.index, limit)
         return trajectory
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainedNavigator:
-    """A navigator that has learned a route, where it can walk.
-
-    Attributes:
-        renderer: Of the world.
-        route: That it has learned.
-        navigator: What steers.
-        model: Its familiarity model with what it was trained on; None where the navigator has none.
-        poses: (n, 3) Where the views were learned; None where that is not known.
-        seconds: That learning took.
-    """
-
-    renderer: "Renderer"
-    route: "Route"
-    navigator: "Navigator"
-    model: "TrainedModel | None"
-    poses: Any
-    seconds: float
-
-    @cached_property
-    def diagnostics(self) -> "Diagnostics":
-        """What finds out why steps are poor."""
-        from .failures import Diagnostics
-
-        return Diagnostics(self.renderer, self.model, self.route)

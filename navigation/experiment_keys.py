@@ -10,8 +10,9 @@ from tussock.world.params import is_generated
 from tussock.world.registry import Registry
 from tussock.world.specs import Spec, format_spec
 
+from .content import content_of
 from .experiment import Experiment
-from .experiment_settings import TYPES, content_of, settings_of
+from .experiment_settings import TYPES, settings_of
 from .models.registry import MODELS
 from .steering.registry import NAVIGATORS
 

@@ -6,11 +6,10 @@
 """
 
 import dataclasses
-import hashlib
 import math
 import shlex
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from tussock.world.errors import SettingError
 from tussock.world.mesh_reading import MeshReading
 
 from .body import Body
+from .content import content_of
 from .experiment import MODEL_SUFFIX, Experiment
 from .stopping import StoppingRules
 from .surroundings import Surroundings
@@ -298,22 +298,3 @@ def _stopping(given: Mapping[str, Any]) -> StoppingRules:
 def _source(source: Any, kind: str) -> str:
     """How settings name a world or a route."""
     return str(source) if isinstance(source, str | Path) else f"a {kind} in memory ({content_of(source)})"
-
-
-def content_of(source: Any) -> str:
-    """Digest of a file, of an image database, or of an object in memory."""
-    if not isinstance(source, str | Path):
-        import joblib
-
-        return str(joblib.hash([getattr(source, each.name) for each in dataclasses.fields(source)]))
-    if Path(source).is_dir():
-        from tussock.render.images.folders import digest_of
-
-        return digest_of(Path(source))
-    status = Path(source).stat()
-    return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
-
-
-@lru_cache(maxsize=1024)  # every run of a sweep names the same few files
-def _file_digest(path: Path, size: int, changed: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

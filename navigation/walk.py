@@ -16,13 +16,14 @@ from jaxtyping import Bool, Float32, UInt8
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
-from tussock.world.geometry import Bounds, Pose, Route, place_text, wrap_angle
+from tussock.world.geometry import Pose, Route, place_text, wrap_angle
 from tussock.world.scene import World
 from tussock.world.terrain import Terrain
 
 from .body import Body
 from .encoding import Encoding
 from .steering.navigator import Look, Motion, Navigator, check_motion
+from .stop_check import StopCheck
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread
 
@@ -255,48 +256,6 @@ class Walker:
             self.stop_check.walked(share)
         self.index += 1
         return step
-
-
-class StopCheck:
-    """How far one agent has come along a route, and whether its walk ends for that.
-
-    Attributes:
-        furthest: Greatest distance along the route that it has reached (m).
-        since: Steps that it has made since it got there, in whole steps.
-    """
-
-    def __init__(self, stopping: StoppingRules, route: Route, field: Bounds, step_length: float):
-        self.stopping, self.route, self.field, self.step_length = stopping, route, field, step_length
-        self.furthest, self.since = -np.inf, 0.0
-        self.been_away = not self._at_goal(route.start)  # where the route ends near its start, it must leave first
-
-    def check(self, pose: Pose, deviation: float, along: float) -> StopReason | None:
-        """Why the walk ends at a pose, this far from the route and along it (m); None where it goes on."""
-        if along > self.furthest:
-            self.furthest, self.since = along, 0.0
-        self.been_away = self.been_away or not self._at_goal(pose)
-        if self.been_away and self._at_goal(pose):
-            return StopReason.ARRIVED
-        if not self.field.contains(pose.x, pose.y):
-            return StopReason.OUT_OF_WORLD
-        if deviation > self.stopping.max_deviation:
-            return StopReason.LOST
-        return StopReason.STUCK if self.since * self.step_length >= self.stopping.patience else None
-
-    def walked(self, share: float) -> None:
-        """Count a step, which is this share of a whole one."""
-        self.since += share
-
-    def put_back(self) -> Pose:
-        """Go on from the waypoint after the furthest point that was reached; its pose."""
-        spacing = self.stopping.waypoint_spacing
-        self.furthest = min((np.floor(self.furthest / spacing + 1e-9) + 1) * spacing, self.route.length)
-        self.since = 0.0
-        return Pose(*self.route.at(self.furthest)[0].tolist())
-
-    def _at_goal(self, pose: Pose) -> bool:
-        goal = self.route.goal
-        return bool(np.hypot(pose.x - goal.x, pose.y - goal.y) <= self.stopping.arrival_radius)
 
 
 def check_inside(pose: Pose, world: World) -> None:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import FIELD, hills, mesh_world, post, random_world, surface, world_of
 
-from tussock.navigation.experiment_settings import content_of
+from tussock.navigation.content import content_of
 from tussock.navigation.surroundings import Surroundings
 from tussock.render.eye import Eye
 from tussock.render.occlusion import covered_within

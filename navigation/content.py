@@ -1,0 +1,26 @@
+"""Digests of what settings name: files, image databases, and worlds and routes in memory."""
+
+import dataclasses
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+
+def content_of(source: Any) -> str:
+    """Digest of a file, of an image database, or of an object in memory."""
+    if not isinstance(source, str | Path):
+        import joblib
+
+        return str(joblib.hash([getattr(source, each.name) for each in dataclasses.fields(source)]))
+    if Path(source).is_dir():
+        from tussock.render.images.folders import digest_of
+
+        return digest_of(Path(source))
+    status = Path(source).stat()
+    return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=1024)  # every run of a sweep names the same few files
+def _file_digest(path: Path, size: int, changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,41 @@
+"""A navigator that has learned a route, with what it was trained on."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tussock.render.renderer import Renderer
+    from tussock.world.geometry import Route
+
+    from .failures import Diagnostics
+    from .models.files import TrainedModel
+    from .steering.navigator import Navigator
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedNavigator:
+    """A navigator that has learned a route, where it can walk.
+
+    Attributes:
+        renderer: Of the world.
+        route: That it has learned.
+        navigator: What steers.
+        model: Its familiarity model with what it was trained on; None where the navigator has none.
+        poses: (n, 3) Where the views were learned; None where that is not known.
+        seconds: That learning took.
+    """
+
+    renderer: "Renderer"
+    route: "Route"
+    navigator: "Navigator"
+    model: "TrainedModel | None"
+    poses: Any
+    seconds: float
+
+    @cached_property
+    def diagnostics(self) -> "Diagnostics":
+        """What finds out why steps are poor."""
+        from .failures import Diagnostics
+
+        return Diagnostics(self.renderer, self.model, self.route)
