@@ -17,7 +17,7 @@ import attrs
 
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
-from tussock.world.mesh_reading import MeshReading
+from tussock.world.meshes.reading import MeshReading
 
 from .body import Body
 from .content import content_of

@@ -11,7 +11,7 @@ import attrs
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
-from tussock.world.mesh_reading import MeshReading
+from tussock.world.meshes.reading import MeshReading
 from tussock.world.settings import choice, instance_of, number, settings, switch, text, whole
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from tussock.world.file_kinds import looks_like_route, looks_like_world
 from tussock.world.files import read_world
-from tussock.world.mesh_reading import UNITS, MeshReading
-from tussock.world.mesh_search import Neighbours
-from tussock.world.obj import map_options
+from tussock.world.meshes.obj import map_options
+from tussock.world.meshes.polygons import triangulated
+from tussock.world.meshes.reading import UNITS, MeshReading
+from tussock.world.meshes.search import Neighbours
 from tussock.world.origin import local_xy
-from tussock.world.polygons import triangulated
 
 logging.disable()  # remarks are many here
 

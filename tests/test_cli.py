@@ -24,7 +24,7 @@ from tussock.navigation.models.files import load_model
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.files import read_world, write_world
-from tussock.world.mesh_reading import MeshReading
+from tussock.world.meshes.reading import MeshReading
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 

@@ -77,7 +77,7 @@ def test_a_mesh_that_is_repeated_too_often_is_refused(tmp_path, monkeypatch):
     for i in range(9):
         scene.add_geometry(trimesh.creation.box(), geom_name="box", node_name=f"place{i}")
     scene.export(tmp_path / "w.glb")
-    monkeypatch.setattr("tussock.world.mesh_files.MAX_TRIANGLES", 100)
+    monkeypatch.setattr("tussock.world.meshes.files.MAX_TRIANGLES", 100)
     with pytest.raises(InputError, match="holds 108 triangles; a world has up to 100"):
         read_world(tmp_path / "w.glb")
 

@@ -11,11 +11,11 @@ import trimesh
 
 from tussock.navigation.experiment import Experiment
 from tussock.render import Eye, open_renderer
-from tussock.world.axes import turned_y_up, turned_z_up
 from tussock.world.errors import FileError, SettingError
 from tussock.world.files import open_world, read_world, write_world
 from tussock.world.geometry import Bounds, Route, place_text
-from tussock.world.mesh_reading import UNITS, MeshReading
+from tussock.world.meshes.axes import turned_y_up, turned_z_up
+from tussock.world.meshes.reading import UNITS, MeshReading
 from tussock.world.origin import FAR, local_route, local_xy, origin_of
 from tussock.world.route_files import write_route
 from tussock.world.scene import World

@@ -13,10 +13,10 @@ from scenes import random_world
 from tussock.world.errors import FileError, InputError
 from tussock.world.file_kinds import looks_like_route, looks_like_world
 from tussock.world.files import read_world, write_world
-from tussock.world.mesh_reading import MeshReading
-from tussock.world.mesh_search import Neighbours
-from tussock.world.obj import map_options
-from tussock.world.polygons import triangulated
+from tussock.world.meshes.obj import map_options
+from tussock.world.meshes.polygons import triangulated
+from tussock.world.meshes.reading import MeshReading
+from tussock.world.meshes.search import Neighbours
 from tussock.world.scene import World
 
 RED = (200, 30, 30)

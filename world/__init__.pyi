@@ -9,7 +9,7 @@ from .files import write_world as write_world
 from .geometry import Bounds as Bounds
 from .geometry import Pose as Pose
 from .geometry import Route as Route
-from .mesh_reading import MeshReading as MeshReading
+from .meshes.reading import MeshReading as MeshReading
 from .params import WorldParams as WorldParams
 from .route_files import read_route as read_route
 from .route_files import write_route as write_route

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .axes import turned_z_up
 from .errors import FileError
 from .geometry import Bounds
-from .mesh_reading import MeshReading
+from .meshes.axes import turned_z_up
+from .meshes.reading import MeshReading
 from .route_files import read_planes
 from .scene import Ground, World
 from .settings import MAX_COORDINATE

@@ -12,12 +12,12 @@ import numpy as np
 
 from .antworld import read_antworld
 from .atomic import replacing
-from .axes import turned_y_up
 from .errors import FileError, InputError, SettingError
 from .file_kinds import refuse_other_kinds
-from .mesh_export import material_writer, meshes_of
-from .mesh_files import read_mesh
-from .mesh_reading import MeshReading
+from .meshes.axes import turned_y_up
+from .meshes.export import material_writer, meshes_of
+from .meshes.files import read_mesh
+from .meshes.reading import MeshReading
 from .params import WORLDS, check_preset, is_generated
 from .route_files import existing_file, naming
 from .scene import World

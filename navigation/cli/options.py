@@ -14,7 +14,7 @@ import attrs
 import tyro
 
 from tussock.world.errors import SettingError
-from tussock.world.mesh_reading import MeshReading
+from tussock.world.meshes.reading import MeshReading
 
 from ..body import Body
 from ..experiment import Experiment

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import tyro
 
 from tussock.world.errors import SettingError
-from tussock.world.mesh_reading import MeshReading
+from tussock.world.meshes.reading import MeshReading
 
 from .options import WORLD, MeshOptions, WorkerOptions, flags_of
 from .terminal import message, progress

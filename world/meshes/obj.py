@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .mesh_search import Neighbours
 from .polygons import triangulated
+from .search import Neighbours
 
 LIBRARY = "tussock.mtl"  # name of all material files together, in what trimesh is given
 MAP_OPTIONS = {  # of a texture in an MTL file, and how many values follow

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .axes import turned_z_up
-from .mesh_reading import MeshReading
+from .reading import MeshReading
 
 WIDE = 1000.0  # m; few worlds that are walked are wider
 NARROW = 0.1  # m

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import FileError
+from ..errors import FileError
 from .ply_header import Element, Header, Property, read_header, rows_of
 from .polygons import triangulated
 

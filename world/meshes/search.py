@@ -10,7 +10,7 @@ from urllib.parse import unquote
 
 from PIL import Image
 
-from .file_kinds import is_lfs_pointer
+from ..file_kinds import is_lfs_pointer
 
 REMOTE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")  # at least two letters, unlike the drive of a Windows path
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from .textures import Texture, Texturing
+from ..textures import Texture, Texturing
 
 _SIDES = (4, 16)  # samples along a side, for triangles of few texels and of many
 _FEW = 4.0  # texels across

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import FileError
+from ..errors import FileError
 
 KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 NUMBERS = {kind: number for number, kind in KINDS.items()}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import FileError
+from ..errors import FileError
 
 KINDS = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8",

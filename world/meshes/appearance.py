@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
-from .errors import FileError
+from ..errors import FileError
+from ..settings import MAX_COORDINATE
+from ..textures import Texture, Texturing, product_table, to_display
 from .gltf_materials import COLOURS, UV, as_material, carried_material
 from .materials import Material
 from .obj_materials import obj_material
-from .settings import MAX_COORDINATE
 from .stl_colours import stl_colours
 from .texture_means import mean_rgb
-from .textures import Texture, Texturing, product_table, to_display
 
 log = logging.getLogger(__name__)
 

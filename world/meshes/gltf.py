@@ -14,10 +14,10 @@ from urllib.parse import unquote_to_bytes
 
 import numpy as np
 
-from .errors import FileError
+from ..errors import FileError
 from .gltf_materials import carry_materials
 from .gltf_numbers import Accessors
-from .mesh_search import Neighbours
+from .search import Neighbours
 
 MAX_NUMBERS = 3 * 10**7  # that a file may claim without having them; as many as the corners of the largest world
 MAX_INSTANCES = 10**5

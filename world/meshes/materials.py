@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from .errors import FileError
-from .textures import MAX_TEXELS, Texture, to_display, to_linear
+from ..errors import FileError
+from ..textures import MAX_TEXELS, Texture, to_display, to_linear
 
 _IDENTITY = np.eye(2, 3)
 

@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import FileError, InputError, first_line
+from ..file_kinds import MAKE_A_MESH, head_of
+from ..geometry import Bounds
+from ..origin import origin_of, shown
+from ..scene import World
+from ..world_data import DEFAULT_SKY, KEY, from_json, is_y_up
+from .appearance import appearance_of
 from .axes import turned_z_up
-from .errors import FileError, InputError, first_line
-from .file_kinds import MAKE_A_MESH, head_of
-from .geometry import Bounds
 from .gltf import prepared_gltf
-from .mesh_materials import appearance_of
-from .mesh_reading import MeshReading
-from .mesh_remarks import remarks_on_axes_and_units
-from .mesh_search import Neighbours
 from .obj import prepared_obj
-from .origin import origin_of, shown
 from .ply import prepared_ply
-from .scene import World
-from .world_data import DEFAULT_SKY, KEY, from_json, is_y_up
+from .reading import MeshReading
+from .remarks import remarks_on_axes_and_units
+from .search import Neighbours
 
 log = logging.getLogger(__name__)
 

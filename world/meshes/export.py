@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from .scene import World
-from .textures import Texture
+from ..scene import World
+from ..textures import Texture
 
 _WRAPS = {"repeat": 10497, "mirror": 33648, "clamp": 33071}  # of glTF samplers
 _FILTERS = {"nearest": 9728, "linear": 9729}

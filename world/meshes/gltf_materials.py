@@ -24,7 +24,7 @@ _SEEN_EXTENSIONS = {  # of materials, that change much of what is seen beyond th
 
 
 def carry_materials(tree: dict[str, Any]) -> None:
-    """Change the JSON of a glTF file so that trimesh keeps what `mesh_materials.py` needs."""
+    """Change the JSON of a glTF file so that trimesh keeps what `appearance.py` needs."""
     materials = tree.get("materials", [])
     sets = []
     for material in materials:

@@ -1,7 +1,7 @@
 """How a mesh file is read: which axis is up, in which unit it is, and whether losses are refused. Light to import."""
 
-from .errors import SettingError
-from .settings import choice, number, settings, switch
+from ..errors import SettingError
+from ..settings import choice, number, settings, switch
 
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}  # in metres
 

@@ -1,0 +1,1 @@
+"""Meshes of other programs: what their files mean, and what is assumed or lost in reading them."""
