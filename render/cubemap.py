@@ -69,11 +69,7 @@ class Cubemap:
         faces, self.rows = [], 0
         for number in np.unique(owner):
             owned = owner == number
-            right, up, forward = axes[number] @ rays[owned].T
-            column, row = (
-                np.clip(np.floor((1 + side / forward) * (size / 2)), 0, size - 1).astype(np.intp)
-                for side in (right, up)
-            )
+            column, row = np.floor(_places(axes[number], rays[owned], size)).clip(0, size - 1).astype(np.intp)
             bottom, rows = int(row.min()), int(row.max() - row.min() + 1)
             faces.append(Face(list(_AXES)[number], axes[number], bottom, rows, self.rows))
             self._pixels[owned] = (row - bottom + self.rows) * size + column
@@ -81,6 +77,21 @@ class Cubemap:
         self.faces = tuple(faces)
         weights = np.cos(eye.elevations(eye.rays)).reshape(eye.height, 1, eye.rays, 1)
         self._weights = (weights / (weights.sum(axis=2, keepdims=True) * eye.rays)).astype(np.float32)
+
+    def ray_offsets(self) -> Float[np.ndarray, "rows size 2"]:
+        """How far to the right and up of the middle of each pixel of the atlas its ray is (pixels); 0 where it has none.
+
+        A ray that shares its pixel with others near a pole may get the offset of one of these.
+        """
+        offsets = np.zeros((self.rows * self.size, 2), dtype=np.float32)
+        rays = _rays(self.eye)
+        axes = np.array(list(_AXES.values()), dtype=np.float64)
+        owner = (rays @ axes[:, 2].T).argmax(axis=-1)
+        for face in self.faces:
+            owned = owner == list(_AXES).index(face.name)
+            places = _places(face.axes, rays[owned], self.size)
+            offsets[self._pixels[owned]] = (places - np.floor(places).clip(0, self.size - 1) - 0.5).T
+        return offsets.reshape(self.rows, self.size, 2)
 
     def unwrap(self, atlas: UInt8[np.ndarray, "rows size 4"]) -> UInt8[np.ndarray, "height width 4"]:
         """The panorama of the faces in an atlas. Each pixel is the average of its rays by solid angle."""
@@ -103,6 +114,12 @@ def face_size_for(eye: Eye) -> int:
     face_pixels_per_ray = 5.0  # in the middle of a face, where pixels are largest
     size = 2 * rays_per_radian * face_pixels_per_ray  # 2: a face goes from tan(-45 degrees) to tan(45 degrees)
     return min(16 * int(np.ceil(size / 16)), MAX_FACE_SIZE)
+
+
+def _places(axes: Float[np.ndarray, "3 3"], rays: Float[np.ndarray, "n 3"], size: int) -> Float[np.ndarray, "2 n"]:
+    """Where rays meet a face with these axes: pixels from its left and its lower edge."""
+    right, up, forward = axes @ rays.T
+    return (1 + np.array([right, up]) / forward) * (size / 2)
 
 
 def _rays(eye: Eye) -> Float[np.ndarray, "rows columns 3"]:

@@ -3,7 +3,7 @@
 pyrender uploads the world once and draws it, textures included. It draws into a framebuffer of ours: its own takes four samples for
 each pixel, which mixes colours on edges as no exact renderer does, and always reads the depth back. The depth is reversed, which
 keeps far surfaces apart whatever the near plane is (gl.Framebuffer, Camera). It draws with shaders of ours: its own do not leave out
-the holes in textures. Textures have no mipmaps, so that each pixel of a face is the texel that a ray would find.
+the holes in textures, and take the texel in the middle of a pixel, not the one that the ray of the eye meets.
 
 Only this module imports pyrender, and only when a renderer is opened: the import binds PyOpenGL to one platform for good.
 """
@@ -50,7 +50,7 @@ class RasterRenderer:
         from pyrender.shader_program import ShaderProgramCache
 
         self._flags = pyrender.RenderFlags.FLAT
-        self._scene, self._camera = _scene(world)
+        self._scene, self._camera = _scene(world, self._cubemap)
         with self._context:
             self._framebuffer = Framebuffer(self._cubemap.size, self._cubemap.rows)
             _check_sizes(world.texturing)
@@ -111,7 +111,7 @@ def _free(context: Context, renderer: Any, framebuffer: Framebuffer) -> None:
         framebuffer.delete()
 
 
-def _scene(world: World) -> tuple[Any, Any]:
+def _scene(world: World, cubemap: Cubemap) -> tuple[Any, Any]:
     """A pyrender scene of a world, and the node of its camera."""
     import pyrender
 
@@ -125,7 +125,7 @@ def _scene(world: World) -> tuple[Any, Any]:
     triangles, rgb = world.surfaces()
     primitives = []
     if world.texturing is not None:
-        primitives = _textured(world.triangles, world.texturing, world.double_sided)
+        primitives = _textured(world.triangles, world.texturing, world.double_sided, _as_texture(cubemap.ray_offsets()))
         plain = np.ones(len(triangles), dtype=bool)  # and the ground
         plain[: len(world.triangles)] = (world.texturing.index < 0) & (world.texturing.colours is None)
         triangles, rgb = triangles[plain], rgb[plain]
@@ -138,19 +138,47 @@ def _scene(world: World) -> tuple[Any, Any]:
     return scene, camera
 
 
-def _coloured(triangles: Float[np.ndarray, "n 3 3"], colours: UInt8[np.ndarray, "m c"], double_sided: bool) -> Any:
-    """A pyrender primitive of triangles without a texture; (3 n, 3) or (3 n, 4) colours of their corners."""
+def _as_texture(offsets: Float[np.ndarray, "rows size 2"]) -> Any:
+    """The offsets of rays, from -1/2 to 1/2, as a pyrender texture."""
+    import pyrender
+    from pyrender.constants import GLTF
+
+    texels = np.zeros((*offsets.shape[:2], 4), dtype=np.uint8)
+    texels[::-1, :, :2] = np.rint(255 * (offsets + 0.5)).clip(0, 255)  # pyrender turns pictures upside down
+    sampler = pyrender.Sampler(magFilter=GLTF.NEAREST, minFilter=GLTF.NEAREST)
+    return pyrender.Texture(source=texels, source_channels="RGBA", sampler=sampler)
+
+
+def _coloured(
+    triangles: Float[np.ndarray, "n 3 3"], colours: UInt8[np.ndarray, "m c"], double_sided: bool, offsets: Any = None
+) -> Any:
+    """A pyrender primitive of triangles without a texture.
+
+    Args:
+        triangles: The triangles.
+        colours: (3 n, 3) or (3 n, 4) of their corners.
+        double_sided: Whether their backs are seen.
+        offsets: See `_as_texture`; None where each triangle has one colour.
+    """
     import pyrender
 
     return pyrender.Primitive(
         positions=triangles.reshape(-1, 3),
         color_0=colours,
-        material=pyrender.MetallicRoughnessMaterial(alphaMode="OPAQUE", doubleSided=double_sided),
+        material=pyrender.MetallicRoughnessMaterial(
+            alphaMode="OPAQUE", doubleSided=double_sided, emissiveTexture=offsets
+        ),
     )
 
 
-def _textured(triangles: Float[np.ndarray, "n 3 3"], texturing: Texturing, double_sided: bool) -> list[Any]:
-    """Pyrender primitives, one for each texture, and one for the triangles that have corner colours only."""
+def _textured(
+    triangles: Float[np.ndarray, "n 3 3"], texturing: Texturing, double_sided: bool, offsets: Any
+) -> list[Any]:
+    """Pyrender primitives, one for each texture, and one for the triangles that have corner colours only.
+
+    Their shader takes the texel that the ray of a pixel meets (offsets, in place of a picture of emitted light), and not the one in
+    the middle of the pixel: so they agree with the exact renderer but for the edges of triangles.
+    """
     import pyrender
     from pyrender.constants import GLTF
 
@@ -159,7 +187,7 @@ def _textured(triangles: Float[np.ndarray, "n 3 3"], texturing: Texturing, doubl
     primitives, colours = [], texturing.colours
     if colours is not None and (texturing.index < 0).any():
         alone = texturing.index < 0
-        primitives.append(_coloured(triangles[alone], colours[alone].reshape(-1, 4), double_sided))
+        primitives.append(_coloured(triangles[alone], colours[alone].reshape(-1, 4), double_sided, offsets))
     for number, texture in enumerate(texturing.textures):
         chosen = texturing.index == number
         if not chosen.any() or texture.threshold > 255:
@@ -173,6 +201,7 @@ def _textured(triangles: Float[np.ndarray, "n 3 3"], texturing: Texturing, doubl
                 1.0,
                 texture.threshold / 255,
             ),  # what our shader takes as the least alpha that is seen
+            emissiveTexture=offsets,
             baseColorTexture=pyrender.Texture(source=texture.rgba, source_channels="RGBA", sampler=sampler),
             alphaMode="OPAQUE",
             doubleSided=double_sided,

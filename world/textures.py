@@ -11,7 +11,6 @@ All colours are display colours (sRGB), as everywhere in tussock. Materials are 
   triangle covers all that is behind it.
 """
 
-import dataclasses
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -111,11 +110,6 @@ class Texturing:
             raise SettingError(
                 f"the textures have {texels:,} texels; a world has up to {MAX_TEXELS:,}, so make them smaller"
             )
-
-    def of(self, chosen: Any) -> "Texturing":
-        """The texturing of some of the triangles, chosen by indices or by a mask."""
-        colours = None if self.colours is None else self.colours[chosen]
-        return dataclasses.replace(self, index=self.index[chosen], uv=self.uv[chosen], colours=colours)
 
     def to_bytes(self) -> bytes:
         """All that it is, for a digest."""

@@ -6,6 +6,9 @@ struct Material {
 #ifdef HAS_BASE_COLOR_TEX
     sampler2D base_color_texture;
 #endif
+#ifdef HAS_EMISSIVE_TEX
+    sampler2D emissive_texture; // no light: how far the ray of each pixel is from its middle (Cubemap.ray_offsets), plus 1/2
+#endif
 };
 
 uniform Material material;
@@ -14,7 +17,7 @@ uniform Material material;
 in vec2 uv;
 #endif
 #ifdef COLOR_0_LOC
-in vec4 corner_colour;
+in vec4 between_corners;
 #endif
 
 out vec4 frag_color;
@@ -31,10 +34,26 @@ vec3 to_display(vec3 linear)
     return mix(high, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
+// What is linear across a triangle, where the ray of this pixel meets it. Divided by the distance, it is linear in the image.
+vec4 at_ray(vec4 value)
+{
+#ifdef HAS_EMISSIVE_TEX
+    vec2 offset = texelFetch(material.emissive_texture, ivec2(gl_FragCoord.xy), 0).xy - 0.5;
+    float w = gl_FragCoord.w;
+    vec4 moved = value * w + dFdx(value * w) * offset.x + dFdy(value * w) * offset.y;
+    return moved / (w + dFdx(w) * offset.x + dFdy(w) * offset.y);
+#else
+    return value;
+#endif
+}
+
 void main()
 {
+#ifdef COLOR_0_LOC
+    vec4 corner_colour = clamp(at_ray(between_corners), 0.0, 1.0);
+#endif
 #ifdef HAS_BASE_COLOR_TEX
-    vec4 colour = texture(material.base_color_texture, uv);
+    vec4 colour = texture(material.base_color_texture, at_ray(vec4(uv, 0.0, 0.0)).xy);
 #ifdef COLOR_0_LOC
     colour = vec4(to_display(to_linear(colour.rgb) * to_linear(corner_colour.rgb)), colour.a * corner_colour.a);
 #endif

@@ -8,7 +8,7 @@ out vec2 uv;
 #endif
 #ifdef COLOR_0_LOC
 layout(location = COLOR_0_LOC) in vec4 color_0;
-out vec4 corner_colour;
+out vec4 between_corners;
 #endif
 layout(location = INST_M_LOC) in mat4 inst_m;
 
@@ -23,6 +23,6 @@ void main()
     uv = texcoord_0;
 #endif
 #ifdef COLOR_0_LOC
-    corner_colour = color_0;
+    between_corners = color_0;
 #endif
 }
