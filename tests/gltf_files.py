@@ -44,7 +44,7 @@ def wall_glb(
         return len(tree["accessors"]) - 1
 
     # The standard's y is up: (x, z, -y).
-    position = np.column_stack([WALL[:, 0], WALL[:, 2], -WALL[:, 1]]) if Y_UP else WALL
+    position = np.column_stack([WALL[:, 0], WALL[:, 2], -WALL[:, 1]])  # y up
     arrays = {"POSITION": position.astype(np.float32)} | attributes
     primitive = {"attributes": {name: accessor(np.asarray(array), name) for name, array in arrays.items()}}
     primitive["indices"] = accessor(np.array([0, 1, 2, 0, 2, 3], np.uint16), "indices")
@@ -62,6 +62,3 @@ def wall_glb(
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(data), len(text), 0x4E4F534A)
     return head + text + struct.pack("<II", len(data), 0x004E4942) + data
-
-
-Y_UP = False  # whether the reader turns glTF, which is y-up

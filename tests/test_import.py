@@ -14,7 +14,7 @@ from tussock.render.images.camera import Camera
 from tussock.render.images.check import check_database
 from tussock.render.images.database import read_database
 from tussock.render.images.entries import ENTRIES
-from tussock.render.images.importing import Import, import_database
+from tussock.render.images.importing import ImportSettings, import_database
 from tussock.render.images.metadata import METADATA, read_metadata, write_metadata
 from tussock.render.images.pictures import read_image
 from tussock.render.images.track import read_track
@@ -123,9 +123,9 @@ def test_headings_of_another_convention_are_refused_with_its_name(folder, tmp_pa
     with pytest.raises(FileError, match="--headings bearing"):
         import_database(tmp_path / "d", folder, track, CAMERA)
     assert not (tmp_path / "d").exists()
-    database, _ = import_database(tmp_path / "d", folder, track, CAMERA, Import(headings="bearing"))
+    database, _ = import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(headings="bearing"))
     assert np.allclose(database.poses, BEND, atol=1e-6)
-    database, _ = import_database(tmp_path / "p", folder, track, CAMERA, Import(headings="path"))
+    database, _ = import_database(tmp_path / "p", folder, track, CAMERA, ImportSettings(headings="path"))
     assert np.abs(database.poses[:, 2] - BEND[:, 2]).max() < 0.09
 
 
@@ -148,7 +148,7 @@ def test_what_is_assumed_is_logged(folder, tmp_path, caplog):
 def test_positions_far_from_the_origin_keep_their_millimetres(folder, tmp_path):
     rows = [(704497000 + 1e3 * x, 5638660000 + 1e3 * y, 0) for x, y, _ in BEND]
     track = table(tmp_path / "t.csv", "x_mm,y_mm,heading_deg", rows)
-    database, _ = import_database(tmp_path / "d", folder, track, CAMERA, Import(headings="as-is"))
+    database, _ = import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(headings="as-is"))
     assert np.abs(database.poses[:, :2] - [704497, 5638660] - BEND[:, :2]).max() < 1e-6
 
 
@@ -164,17 +164,17 @@ def test_frames_are_taken_by_number_and_by_time(video, tmp_path):
         tmp_path / "t.csv", "time_ms,x_m,y_m,bearing", [(5000 + 300 * i, *row[1:]) for i, row in enumerate(rows)]
     )
     assert levels(import_database(tmp_path / "t", video, by_time, CAMERA)[0]) == [0, 3, 6, 9, 12, 15]
-    later = import_database(tmp_path / "s", video, by_time, CAMERA, Import(start=4.8))[0]
+    later = import_database(tmp_path / "s", video, by_time, CAMERA, ImportSettings(start=4.8))[0]
     assert levels(later) == [2, 5, 8, 11, 14, 17]
     with pytest.raises(FileError, match="line 2: it is before the first frame"):
-        import_database(tmp_path / "e", video, by_time, CAMERA, Import(start=5.2))
+        import_database(tmp_path / "e", video, by_time, CAMERA, ImportSettings(start=5.2))
 
 
 def test_every_frame_between_rows_is_interpolated(video, tmp_path):
     track = table(
         tmp_path / "t.csv", "frame,x_m,y_m,heading_deg", [(0, 0, 0, 170), (10, 1, 0, -170), (19, 1, 0.9, -170)]
     )
-    database, _ = import_database(tmp_path / "d", video, track, CAMERA, Import(every=5, headings="as-is"))
+    database, _ = import_database(tmp_path / "d", video, track, CAMERA, ImportSettings(every=5, headings="as-is"))
     assert levels(database) == [0, 5, 10, 15]
     assert np.allclose(database.poses[:, :2], [(0, 0), (0.5, 0), (1, 0), (1, 0.5)])
     assert np.allclose(np.degrees(database.poses[:, 2]) % 360, [170, 180, 190, 190])
@@ -184,13 +184,18 @@ def test_a_row_for_each_frame_and_unsorted_frames(video, tmp_path):
     track = table(tmp_path / "a.csv", "x_m,y_m,heading_rad", BEND)
     assert levels(import_database(tmp_path / "a", video, track, CAMERA)[0]) == list(range(N))
     back = table(tmp_path / "b.csv", "frame,x_m,y_m", [(i, i / 10, 0) for i in (7, 3, 3, 11)])
-    assert levels(import_database(tmp_path / "b", video, back, CAMERA, Import(headings="path"))[0]) == [7, 3, 3, 11]
+    assert levels(import_database(tmp_path / "b", video, back, CAMERA, ImportSettings(headings="path"))[0]) == [
+        7,
+        3,
+        3,
+        11,
+    ]
     few = table(tmp_path / "c.csv", "x_m,y_m,heading_rad", BEND[:5])
     with pytest.raises(FileError, match=r"5 rows and v\.avi 20 frames"):
         import_database(tmp_path / "c", video, few, CAMERA)
     far = table(tmp_path / "f.csv", "frame,x_m,y_m", [(0, 0, 0), (10**9, 1, 0)])
     with pytest.raises(FileError, match="20 frames that can be read; there is no frame 1000000000"):
-        import_database(tmp_path / "f", video, far, CAMERA, Import(headings="path"))
+        import_database(tmp_path / "f", video, far, CAMERA, ImportSettings(headings="path"))
 
 
 # Grids, masks, and completing.
@@ -199,7 +204,7 @@ def test_a_row_for_each_frame_and_unsorted_frames(video, tmp_path):
 def test_a_grid_has_its_indices_and_metadata(folder, tmp_path):
     rows = [(0.5 * (i % 5), 0.25 * (i // 5), 90) for i in range(N)]
     track = table(tmp_path / "t.csv", "x_m,y_m,bearing", rows)
-    database, _ = import_database(tmp_path / "d", folder, track, CAMERA, Import(kind="grid"))
+    database, _ = import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(kind="grid"))
     assert database.kind == "grid"
     assert database.columns["Grid X"][:6] == ("0", "1", "2", "3", "4", "0")
     assert database.metadata["grid"] == {
@@ -215,7 +220,7 @@ def test_a_grid_has_its_indices_and_metadata(folder, tmp_path):
             folder,
             table(tmp_path / "u.csv", "x_m,y_m", [r[:2] for r in rows]),
             CAMERA,
-            Import(kind="grid"),
+            ImportSettings(kind="grid"),
         )
 
 
@@ -232,7 +237,7 @@ def test_a_mask_is_unwrapped_and_kept_with_the_eye(tmp_path, raw):
     camera = Camera(lens="ring", centre=(49.5, 49.5), inner=10, outer=45, top=1.0, bottom=-0.2, width=32, height=8)
     track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND[:3])
     database, _ = import_database(
-        tmp_path / "d", tmp_path / "raw", track, camera, Import(mask=save(tmp_path / "m.png", mask))
+        tmp_path / "d", tmp_path / "raw", track, camera, ImportSettings(mask=save(tmp_path / "m.png", mask))
     )
     eye = database.metadata["tussock"]["eye"]
     assert (eye["width"], eye["height"], eye["top"], eye["mask"]) == (32, 8, 1.0, "mask.png")
@@ -243,7 +248,7 @@ def test_a_mask_is_unwrapped_and_kept_with_the_eye(tmp_path, raw):
     assert check_database(tmp_path / "d") == []
     save(tmp_path / "m.png", np.zeros((5, 77, 3), np.uint8))
     with pytest.raises(FileError, match="give a mask of the size"):
-        import_database(tmp_path / "e", tmp_path / "raw", track, camera, Import(mask=tmp_path / "m.png"))
+        import_database(tmp_path / "e", tmp_path / "raw", track, camera, ImportSettings(mask=tmp_path / "m.png"))
 
 
 def test_an_interrupted_import_is_completed_and_another_one_is_refused(folder, tmp_path):
@@ -258,7 +263,10 @@ def test_an_interrupted_import_is_completed_and_another_one_is_refused(folder, t
     assert again.columns == whole.columns
     assert np.array_equal(again.views(), whole.views())
     assert import_database(tmp_path / "b", folder, track, CAMERA)[1] == 0
-    for camera, settings in ((Camera(lens="panorama", top=0.9, bottom=-0.2), Import()), (CAMERA, Import(every=2))):
+    for camera, settings in (
+        (Camera(lens="panorama", top=0.9, bottom=-0.2), ImportSettings()),
+        (CAMERA, ImportSettings(every=2)),
+    ):
         with pytest.raises(FileError, match="differs in its"):
             import_database(tmp_path / "b", folder, track, camera, settings)
     (tmp_path / "notes").mkdir()
@@ -292,7 +300,7 @@ def test_what_does_not_fit_together_is_refused_in_one_line(folder, video, tmp_pa
     def refused(message: str, header: str, rows, source: Path = folder) -> None:
         track = table(tmp_path / "t.csv", header, rows)
         with pytest.raises(InputError, match=message) as refusal:
-            import_database(tmp_path / "d", source, track, CAMERA, Import(headings="path"))
+            import_database(tmp_path / "d", source, track, CAMERA, ImportSettings(headings="path"))
         assert "\n" not in str(refusal.value)
         assert not (tmp_path / "d").exists()
 

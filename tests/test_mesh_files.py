@@ -563,3 +563,25 @@ def test_the_same_world_in_any_file_gives_the_same_view_and_the_same_walk(tmp_pa
         assert (view != views[0]).any(axis=-1).mean() < 0.001
         assert len(walk) > 10
         assert np.allclose(walk, walks[0], atol=1e-3)
+
+
+def test_a_gltf_that_only_stands_with_z_up_is_read_so_and_that_is_said(tmp_path, caplog):
+    wall = np.array([[(-1, 1, 0), (1, 1, 0), (1, 1, 1)], [(-1, 1, 0), (1, 1, 1), (-1, 1, 1)]], dtype=float)
+    floor = np.array(
+        [[(-1, 0, -1), (1, 0, -1), (1, 0, 1)], [(-1, 0, -1), (1, 0, 1), (-1, 0, 1)]], dtype=float
+    )  # with y up
+
+    def height(name, triangles, reading=None):
+        path = tmp_path / f"{name}.glb"
+        corners = triangles.reshape(-1, 3)
+        trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False).export(path)
+        caplog.clear()
+        return np.ptp(read_world(path, reading).triangles[..., 2])
+
+    assert height("wall", wall) == 1
+    assert "--up y takes the standard's axis" in caplog.text
+    assert height("wall", wall, MeshReading(up="y")) == 0
+    assert height("floor", floor) == 0
+    assert "standard's axis" not in caplog.text
+    assert height("both", np.concatenate([wall[..., [0, 2, 1]] - [0, 0, 1], floor])) == 1
+    assert "standard's axis" not in caplog.text

@@ -24,7 +24,20 @@ from tussock.world.geometry import Pose
 CLONE = Path(__file__).parents[1]
 NAMES = {
     "tussock.render": {"Eye", "Renderer", "open_renderer"},
-    "tussock.render.images": {"Database", "Grid", "Problem", "check_database", "read_database", "write_database"},
+    "tussock.render.images": {
+        "Camera",
+        "Database",
+        "Grid",
+        "ImportSettings",
+        "Problem",
+        "Unwrapping",
+        "check_database",
+        "find_ring",
+        "import_database",
+        "read_database",
+        "unwrap_files",
+        "write_database",
+    },
 }
 
 

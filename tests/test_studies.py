@@ -36,6 +36,8 @@ from tussock.world.scene import World
 EYE = Eye(width=72, height=15, samples=1)
 WORLD = World.generate("tiny", 1)
 ROUTE = generate_route(WORLD, 1, 2.0)
+TURNS = np.linspace(0, 3 * np.pi, 60)
+BENDING = Route.through(np.column_stack([0.6 + 0.02 * np.arange(60), 1.5 + 0.15 * np.sin(TURNS)]))
 FAST = ("setting", "visual-compass", "frequency")
 
 
@@ -239,7 +241,7 @@ def test_databases_that_do_not_fit_a_study_are_refused(tmp_path):
         write_database(tmp_path / "grid", renderer, Grid.over(published_grid_area(WORLD.field), 0.2))
         write_database(tmp_path / "route", renderer, ROUTE.resampled(0.1).poses)
         write_database(tmp_path / "fine", renderer, ROUTE.resampled(0.02).poses)
-        write_database(tmp_path / "turned", renderer, ROUTE.resampled(0.02).poses + [0, 0, np.pi / 2])
+        write_database(tmp_path / "mirrored", renderer, BENDING.resampled(0.02).poses * [1, 1, -1] + [0, 0, np.pi / 2])
         write_database(tmp_path / "coarse", renderer, Grid(begin=(0.0, 0.0), spacing=0.1, size=(2, 2)))
     with open_renderer(WORLD, Eye(width=36, height=15, samples=1)) as renderer:
         write_database(tmp_path / "small", renderer, ROUTE.resampled(0.02).poses)
@@ -247,7 +249,7 @@ def test_databases_that_do_not_fit_a_study_are_refused(tmp_path):
         ("route", "route", FileError, "route is a database of a route; give one of a grid"),
         ("grid", "small", FileError, r"different sizes \(36 x 15 and 72 x 15\)"),
         ("grid", "route", SettingError, "20 route views; a study needs at least 48"),
-        ("grid", "turned", FileError, "headings are 8. degrees off the path"),
+        ("grid", "mirrored", FileError, "headings are .* degrees off the path .*counter-clockwise from .x they fit"),
         ("coarse", "fine", SettingError, "0 grid positions lie within 0.2 m"),
     )
     for grid, route, kind, message in cases:

@@ -136,9 +136,9 @@ class DatabaseImportCommand(CameraOptions):
     """Picture that is white where the eye sees and black where it is covered, of the size of the pictures or of the panoramas."""
 
     def run(self) -> dict[str, Any]:
-        from tussock.render.images.importing import Import, import_database
+        from tussock.render.images.importing import ImportSettings, import_database
 
-        settings = Import(
+        settings = ImportSettings(
             kind=self.kind,
             columns=self.columns,
             unit=self.unit,

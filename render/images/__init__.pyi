@@ -2,7 +2,7 @@ from .camera import Camera as Camera
 from .check import check_database as check_database
 from .database import Database as Database
 from .database import read_database as read_database
-from .importing import Import as Import
+from .importing import ImportSettings as ImportSettings
 from .importing import import_database as import_database
 from .inspection import Problem as Problem
 from .panoramas import unwrap_files as unwrap_files

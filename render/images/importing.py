@@ -46,7 +46,7 @@ MAX_LATTICE = 0.05  # of the spacing by which positions of a grid may be off
 
 
 @settings
-class Import:
+class ImportSettings:
     """How a table and pictures become a database.
 
     Attributes:
@@ -79,7 +79,7 @@ def import_database(
     source: Path,
     track: Path | None = None,
     camera: Camera | None = None,
-    settings: Import | None = None,
+    settings: ImportSettings | None = None,
     progress: Progress = no_progress,
 ) -> tuple[Database, int]:
     """Make an image database of pictures and a table. A folder that an interrupted call left is completed.
@@ -98,7 +98,7 @@ def import_database(
     Raises:
         InputError: Anything cannot be read or does not fit together, or `out` holds anything else. Then nothing is changed.
     """
-    camera, settings = camera or Camera(), settings or Import()
+    camera, settings = camera or Camera(), settings or ImportSettings()
     origin = _metadata_of(source)
     kind = settings.kind or str(origin.get("type", "route"))
     if kind not in KINDS:
@@ -253,7 +253,9 @@ def _metadata(
     return metadata | {"camera": camera, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": tussock}
 
 
-def _digest(source: Path, taken: Taken, unwrapping: Unwrapping, seen: np.ndarray | None, settings: Import) -> str:
+def _digest(
+    source: Path, taken: Taken, unwrapping: Unwrapping, seen: np.ndarray | None, settings: ImportSettings
+) -> str:
     """What decides the images: only the same is completed."""
     sizes = [os.path.getsize(source / each) if isinstance(each, str) else 0 for each in taken.references]
     parts = [unwrapping, settings.format, settings.quality, [label(each) for each in taken.references], sizes]

@@ -23,6 +23,7 @@ from .ply import prepared_ply
 from .reading import MeshReading
 from .remarks import remarks_on_axes_and_units
 from .search import Neighbours
+from .upright import only_stands_with_z_up
 
 log = logging.getLogger(__name__)
 
@@ -75,8 +76,21 @@ def read_mesh(path: Path, reading: MeshReading) -> World:
     if reading.up != "auto":
         up = reading.up
     elif file.kind in GLTF and is_y_up(file.own):
-        up = "y"
+        up = "y" if file.own is not None or not _stands_with_z_up(path, meshes, reading) else "z"
     return _readable(path, lambda: _world(path, file, meshes, reading, up))
+
+
+def _stands_with_z_up(path: Path, meshes: list, reading: MeshReading) -> bool:
+    """Whether a glTF file is taken to have z up, against its standard; then it is said."""
+    corners = [np.asarray(mesh.vertices, dtype=np.float64)[mesh.faces].reshape(-1, 3) for mesh in meshes]
+    with np.errstate(all="ignore"):
+        taken = only_stands_with_z_up(corners, reading.metres)
+    if taken:
+        log.warning(
+            f"{path}: glTF has y up, but then nearly all of it would hang level in the air, and with z up it stands on the ground; "
+            "z is taken as up, and --up y takes the standard's axis"
+        )
+    return taken
 
 
 def _kind(path: Path, known: set[str]) -> str:
