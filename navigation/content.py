@@ -7,6 +7,11 @@ from pathlib import Path
 from typing import Any
 
 
+def label_of(source: Any, kind: str) -> str:
+    """How settings name a world or a route. kind: what it is."""
+    return str(source) if isinstance(source, str | Path) else f"a {kind} in memory ({content_of(source)})"
+
+
 def content_of(source: Any) -> str:
     """Digest of a file, of an image database, or of an object in memory."""
     if not isinstance(source, str | Path):

@@ -20,7 +20,7 @@ from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
 
 from .body import Body
-from .content import content_of
+from .content import label_of
 from .experiment import MODEL_SUFFIX, Experiment
 from .stopping import StoppingRules
 from .surroundings import Surroundings
@@ -83,37 +83,12 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     """The settings that describe an experiment, by the names of TYPES; those that are derived from others are None."""
     from .encoding import describe_encoding
 
-    eye, training, body, stopping = experiment.eye, experiment.training, experiment.body, experiment.stopping
-    reading = experiment.reading
-    encoding, resize, blur = describe_encoding(experiment.encoding, eye)
+    training, body, stopping = experiment.training, experiment.body, experiment.stopping
+    encoding, resize, blur = describe_encoding(experiment.encoding, experiment.eye)
     navigator, parameters = experiment.navigator, dict(experiment.navigator.parameters)
     scans = navigator.name == "scan"
     width, about = (parameters.pop("width", math.pi), parameters.pop("about", None)) if scans else (None, None)
-    return {
-        "world": None if experiment.route_database is not None else _source(experiment.world, "world"),
-        "world_seed": experiment.world_seed,
-        "up": reading.up,
-        "unit": reading.unit,
-        "scale": reading.scale,
-        "strict": reading.strict,
-        "ground": experiment.ground,
-        "max_slope_deg": degrees(experiment.max_slope),
-        "seed": experiment.seed,
-        "size": f"{eye.width}x{eye.height}",
-        "renderer": experiment.renderer,
-        "samples": eye.samples,
-        "eye_height_m": eye.z,
-        "top_deg": degrees(eye.top),
-        "bottom_deg": degrees(eye.bottom),
-        "field_deg": degrees(eye.field),
-        "mask": None if eye.mask is None else eye.mask.source or str(eye.mask),
-        "cull_back_faces": experiment.cull_back_faces,
-        "route": None if experiment.route is None else _source(experiment.route, "route"),
-        "route_seed": experiment.route_seed,
-        "route_length_m": experiment.route_length,
-        "headings": experiment.headings,
-        "columns": experiment.columns,
-        "smooth_m": experiment.smooth,
+    return _settings_of_surroundings(experiment) | {
         "encoding": encoding,
         "resize": resize,
         "blur": blur,
@@ -137,6 +112,36 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "navigator": str(dataclasses.replace(navigator, parameters=parameters)),
         "route_database": None if experiment.route_database is None else str(experiment.route_database),
         "grid_database": None if experiment.grid_database is None else str(experiment.grid_database),
+    }
+
+
+def _settings_of_surroundings(surroundings: Surroundings) -> dict[str, Any]:
+    eye, reading = surroundings.eye, surroundings.reading
+    return {
+        "world": None if surroundings.route_database is not None else label_of(surroundings.world, "world"),
+        "world_seed": surroundings.world_seed,
+        "up": reading.up,
+        "unit": reading.unit,
+        "scale": reading.scale,
+        "strict": reading.strict,
+        "ground": surroundings.ground,
+        "max_slope_deg": degrees(surroundings.max_slope),
+        "seed": surroundings.seed,
+        "size": f"{eye.width}x{eye.height}",
+        "renderer": surroundings.renderer,
+        "samples": eye.samples,
+        "eye_height_m": eye.z,
+        "top_deg": degrees(eye.top),
+        "bottom_deg": degrees(eye.bottom),
+        "field_deg": degrees(eye.field),
+        "mask": None if eye.mask is None else eye.mask.source or str(eye.mask),
+        "cull_back_faces": surroundings.cull_back_faces,
+        "route": None if surroundings.route is None else label_of(surroundings.route, "route"),
+        "route_seed": surroundings.route_seed,
+        "route_length_m": surroundings.route_length,
+        "headings": surroundings.headings,
+        "columns": surroundings.columns,
+        "smooth_m": surroundings.smooth,
     }
 
 
@@ -293,8 +298,3 @@ def _stopping(given: Mapping[str, Any]) -> StoppingRules:
         given, arrival_radius="arrive_m", max_deviation="lost_m", patience="patience_m", waypoint_spacing="waypoint_m"
     )
     return StoppingRules(**rules, max_steps=given.get("max_steps"), put_back=on_lost == "reset")
-
-
-def _source(source: Any, kind: str) -> str:
-    """How settings name a world or a route."""
-    return str(source) if isinstance(source, str | Path) else f"a {kind} in memory ({content_of(source)})"
