@@ -8,7 +8,7 @@ from tussock.world.errors import FileError, SettingError
 from tussock.world.progress import Progress, no_progress
 
 from .camera import Camera
-from .database import make_folder
+from .database import check_new, make_folder
 from .pictures import SUFFIXES, Picture, encoded
 from .ring_search import draw_ring
 from .sources import Reference, check_alike, frames_of, is_video_file, picture_names, read_pictures, sample
@@ -83,8 +83,7 @@ def _files(out: Path, references: list, single: bool, suffix: str) -> list[Path]
         if out.suffix.lower() not in FORMATS:
             raise FileError(f"{out}: a panorama is written as .png or .jpg")
         return [out]
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise FileError(f"{out} exists already and is not empty; give a new folder")
+    check_new(out)
     if isinstance(references[0], int):
         return [out / f"frame_{number:05d}{suffix}" for number in references]
     stems = [Path(name).stem for name in references]
