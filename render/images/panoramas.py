@@ -11,7 +11,7 @@ from .camera import Camera
 from .database import check_new, make_folder
 from .pictures import SUFFIXES, Picture, encoded
 from .ring_search import draw_ring
-from .sources import Reference, check_alike, frames_of, is_video_file, picture_names, read_pictures, sample
+from .sources import frames_of, is_video_file, picture_names, read_panoramas, sample
 from .unwrapping import Ring, Unwrapping
 
 FORMATS = (".png", ".jpg")
@@ -66,11 +66,8 @@ def unwrap_files(
     if not single:
         make_folder(out)
 
-    def panorama(reference: Reference, picture: Picture) -> Picture:
-        check_alike(folder, reference, picture, pictures[0].shape)
-        return unwrapping(picture)
-
-    for done, (file, made) in enumerate(zip(files, read_pictures(folder, references, panorama), strict=True), 1):
+    panoramas = read_panoramas(folder, references, unwrapping, pictures[0].shape)
+    for done, (file, made) in enumerate(zip(files, panoramas, strict=True), 1):
         _write(file, made, quality)
         progress(done, len(files))
     return unwrapping, len(files)
