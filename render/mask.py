@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # the command line reads the defaults of an eye: without nump
     import numpy as np
     from jaxtyping import Bool
 
-MAX_PIXELS = 2**24  # of a picture of a mask
+MAX_PIXELS = 8 * 10**7  # of a picture of a mask, as of those of cameras
 MIN_BRIGHT = 128  # a pixel of a picture that is at least so bright, and so opaque, is visible
 FORM = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4}):([\w=-]*)")
 
@@ -123,8 +123,8 @@ def fitted(visible: "Bool[np.ndarray, 'rows columns']", width: int, height: int)
         each = np.arange(pixels)
         return each * of // pixels, -(-(each + 1) * of // pixels)
 
-    hidden = np.zeros((visible.shape[0] + 1, visible.shape[1] + 1), np.int64)
-    hidden[1:, 1:] = (~visible).cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
+    hidden = np.zeros((visible.shape[0] + 1, visible.shape[1] + 1), np.int32)  # enough for 2**31 pixels
+    hidden[1:, 1:] = (~visible).cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32)
     (top, bottom), (left, right) = edges(height, visible.shape[0]), edges(width, visible.shape[1])
     rows = hidden[bottom] - hidden[top]
     return rows[:, right] == rows[:, left]

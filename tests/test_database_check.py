@@ -361,6 +361,12 @@ def test_the_sussex_grid_and_routes_are_correct(tmp_path, sussex):
             assert check_database(tmp_path / name) == []
 
 
+def test_headings_that_were_chosen_are_examined_as_they_were_read(route):
+    (problem,) = check_database(route, headings="ccw")  # they are bearings
+    assert problem.kind == "heading-convention"
+    assert "--headings bearing reads" in problem.what
+
+
 def test_a_convention_that_was_found_is_read_with_its_flag(route):
     text = (route / ENTRIES).read_text().splitlines()
     rows = [line.split(", ") for line in text[1:]]

@@ -6,6 +6,7 @@ import logging
 import shutil
 from pathlib import Path
 
+import attrs
 import cv2
 import numpy as np
 import pytest
@@ -356,6 +357,15 @@ def test_the_eye_of_a_database_is_that_of_its_metadata_or_its_images(copies, cap
     assert eye == Eye(width=120, height=30)
     assert [record.message for record in caplog.records if "--top-deg" in record.message]
     assert eye_of(*copies, {"top": 0.5, "bottom": -0.5}) == Eye(width=120, height=30, top=0.5, bottom=-0.5)
+
+
+def test_a_mask_hides_unknown_parts_where_the_metadata_do_not_say_who_drew_the_images(copies):
+    metadata = read_metadata(copies[0] / METADATA)
+    write_metadata(copies[0] / METADATA, metadata | {"tussock": None})
+    mask = np.ones((EYE.height, EYE.width), bool)
+    mask[:, :9] = False
+    with pytest.raises(FileError, match="its mask hides parts"):
+        open_views(copies[0], eye=attrs.evolve(EYE, mask=mask))
 
 
 def test_the_key_of_a_run_depends_on_the_images(copies):

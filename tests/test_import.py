@@ -251,6 +251,17 @@ def test_a_mask_is_unwrapped_and_kept_with_the_eye(tmp_path, raw):
         import_database(tmp_path / "e", tmp_path / "raw", track, camera, ImportSettings(mask=tmp_path / "m.png"))
 
 
+def test_a_transparent_part_of_a_mask_is_covered(folder, tmp_path):
+    mask = np.full((HEIGHT, WIDTH, 4), 255, np.uint8)
+    mask[:, :5, 3] = 0  # white, and transparent
+    cv2.imwrite(str(tmp_path / "m.png"), mask)
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
+    import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(mask=tmp_path / "m.png"))
+    kept = read_image(tmp_path / "d" / "mask.png")
+    assert (kept[:, :5] == 0).all()
+    assert (kept[:, 6:-1] == 255).all()
+
+
 def test_an_interrupted_import_is_completed_and_another_one_is_refused(folder, tmp_path):
     track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
     whole, _ = import_database(tmp_path / "a", folder, track, CAMERA)
@@ -286,6 +297,8 @@ def test_a_database_that_needs_unwrapping_is_imported_with_its_own_rows(folder, 
     write_metadata(folder / METADATA, {"type": "route", "needsUnwrapping": 1, "unwrapper": ring})
     database, _ = import_database(tmp_path / "d", folder)
     assert np.array_equal(database.views(), read_database(folder).views())
+    write_metadata(folder / METADATA, {"type": "route", "needsUnwrapping": 1, "imageInput": {"unwrapper": ring}})
+    assert np.array_equal(import_database(tmp_path / "f", folder)[0].views(), database.views())
     assert not database.metadata["needsUnwrapping"]
     write_metadata(folder / METADATA, {"type": "route", "needsUnwrapping": 1})
     with pytest.raises(FileError, match="tussock unwrap"):

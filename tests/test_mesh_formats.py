@@ -11,7 +11,7 @@ from PIL import Image
 from scenes import random_world
 
 from tussock.world.errors import FileError, InputError
-from tussock.world.file_kinds import looks_like_route, looks_like_world
+from tussock.world.file_kinds import kind_of, looks_like_route, looks_like_world, numbers_in
 from tussock.world.files import read_world, write_world
 from tussock.world.meshes.obj import map_options
 from tussock.world.meshes.polygons import triangulated
@@ -364,22 +364,22 @@ def test_a_world_and_a_route_are_told_apart_by_their_contents(tmp_path, sussex):
     planes.astype("<f8").tofile(tmp_path / "route.bin")  # a multiple of 96 bytes as well
     planes[:, :95].astype("<f8").tofile(tmp_path / "odd.bin")
     for name in ("route.bin", "odd.bin"):
-        assert looks_like_route(tmp_path / name)
-        assert not looks_like_world(tmp_path / name)
+        assert looks_like_route(numbers_in(tmp_path / name))
+        assert not looks_like_world(numbers_in(tmp_path / name))
         with pytest.raises(FileError, match=r"seems to be a route.*--route"):
             read_world(tmp_path / name)
     world = sussex / "world5000_gray.bin"
-    assert looks_like_world(world)
-    assert not looks_like_route(world)
+    assert looks_like_world(numbers_in(world))
+    assert not looks_like_route(numbers_in(world))
     for path in sussex.glob("ant*_route*.bin"):
-        assert looks_like_route(path)
-        assert not looks_like_world(path)
+        assert looks_like_route(numbers_in(path))
+        assert not looks_like_world(numbers_in(path))
     for suffix in (".glb", ".ply"):
         write_world(random_world(), tmp_path / f"w{suffix}")
-        assert looks_like_world(tmp_path / f"w{suffix}")
+        assert kind_of((tmp_path / f"w{suffix}").read_bytes()) == ("world", suffix[1:].upper(), "")
     trimesh.creation.box().export(tmp_path / "box.obj")
-    trimesh.creation.box().export(tmp_path / "box.stl", file_type="stl_ascii")
-    (tmp_path / "r.csv").write_text("x_m,y_m\n0,0\n1,1\n")
-    assert looks_like_world(tmp_path / "box.obj")
-    assert looks_like_world(tmp_path / "box.stl")
-    assert not looks_like_world(tmp_path / "r.csv")
+    trimesh.creation.box().export(tmp_path / "ascii.stl", file_type="stl_ascii")
+    trimesh.creation.box().export(tmp_path / "binary.stl")
+    for name, kind in [("box.obj", "OBJ"), ("ascii.stl", "STL"), ("binary.stl", "STL")]:
+        assert kind_of((tmp_path / name).read_bytes()) == ("world", kind, "")
+    assert kind_of(b"x_m,y_m\n0,0\n1,1\n") is None

@@ -2,14 +2,57 @@
 
 import os
 import re
+import struct
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from .errors import FileError
 
 HEAD = 4096  # bytes that are looked at
-LFS = b"version https://git-lfs.github.com/spec/"
+
+
+class Kind(NamedTuple):
+    """What a file is by its content.
+
+    Attributes:
+        group: "pointer", "world", "image", "video", "archive", "page", "json", or "other".
+        name: What it is, for messages.
+        remedy: How the points of a route can be had from it; empty where it holds none.
+    """
+
+    group: str
+    name: str
+    remedy: str = ""
+
+
+POINTER = Kind("pointer", "a pointer of Git LFS, not the file itself", "run: git lfs pull")
+BEGINNINGS = (
+    (b"version https://git-lfs.github.com/spec/", POINTER),
+    (b"glTF", Kind("world", "GLB")),
+    (b"ply\n", Kind("world", "PLY")),
+    (b"ply\r", Kind("world", "PLY")),
+    (b"\x89HDF", Kind("other", "an HDF5 file (MATLAB's -v7.3)", "save it with -v7, or as CSV")),
+    (b"\x89PNG", Kind("image", "an image (PNG)")),
+    (b"\xff\xd8\xff", Kind("image", "an image (JPEG)")),
+    (b"GIF8", Kind("image", "an image (GIF)")),
+    (b"II*\0", Kind("image", "an image (TIFF)")),
+    (b"MM\0*", Kind("image", "an image (TIFF)")),
+    (b"BM", Kind("image", "an image (BMP)")),
+    (b"%PDF", Kind("other", "a PDF")),
+    (b"\xd0\xcf\x11\xe0", Kind("other", "a spreadsheet (.xls)", "save it as CSV")),
+    (b"PK\x03\x04", Kind("archive", "a ZIP archive, as spreadsheets are (.xlsx, .ods)", "save it as CSV")),
+    (b"\x1f\x8b\x08", Kind("archive", "compressed (gzip)", "unpack it")),
+    (b"7z\xbc\xaf", Kind("archive", "compressed (7-Zip)", "unpack it")),
+    (b"Rar!", Kind("archive", "compressed (RAR)", "unpack it")),
+    (b"BZh", Kind("archive", "compressed (bzip2)", "unpack it")),
+    (b"SQLite format 3\0", Kind("other", "a database (SQLite, as ROS 2 bags are)", "export its poses as CSV")),
+    (b"#ROSBAG", Kind("other", "a ROS bag", "export its poses as CSV")),
+)
+PAGE = re.compile(rb"\s*(<!doctype html|<html)", re.IGNORECASE)
+OBJ_LINE = re.compile(rb"(mtllib|usemtl|o|g|s|vn|vt|vp)\s|v(\s+[-+.\deE]+){3,}\s*$|f(\s+-?\d+[\d/-]*){3,}\s*$")
 # Formats that only the programs they belong to read well, and these programs.
 PROGRAMS = {
     ".blend": "Blender", ".fbx": "Blender, or the program that wrote it", ".dae": "Blender", ".usd": "Blender", ".usda": "Blender",
@@ -20,8 +63,44 @@ PROGRAMS = {
 }  # fmt: skip
 CLOUDS = (".e57", ".las", ".laz", ".xyz", ".pcd", ".pts", ".ptx", ".asc")
 MAKE_A_MESH = "make a mesh of it, for example by Poisson reconstruction in MeshLab or CloudCompare"
-ARCHIVES = (b"PK\x03\x04", b"7z\xbc\xaf", b"Rar!", b"\x1f\x8b\x08", b"BZh")
-IMAGES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM")
+# Kinds that are no world, with what to do; {} is the name of the kind.
+REFUSED = {
+    "archive": "a compressed archive; unpack it and give the mesh that is in it",
+    "page": "a web page, not a mesh (was a link saved in its place?); download the file itself",
+    "image": "an image; give the mesh of a world",
+    "video": "{}; give the mesh of a world",
+    "other": "{}; give the mesh of a world",
+}
+
+
+def kind_of(data: bytes) -> Kind | None:
+    """What a file is that is no table of numbers; None where it is not known to be something else.
+
+    Args:
+        data: The whole file, or its beginning.
+    """
+    for start, kind in BEGINNINGS:
+        if data.startswith(start) and (start != b"BM" or b"\0" in data[:14]):
+            return kind
+    if data.startswith(b"RIFF") and data[8:12] in (b"WEBP", b"AVI "):
+        return Kind("image", "an image (WebP)") if data[8:12] == b"WEBP" else Kind("video", "a video (AVI)")
+    if data[4:8] == b"ftyp":
+        return Kind("video", "a video (MP4)")
+    if PAGE.match(data):
+        return Kind("page", "a web page (was a link saved in its place?)", "download the file itself")
+    if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
+        return Kind("world", "STL")
+    head = data[:HEAD].lstrip()
+    if head.startswith(b"solid") and b"facet" in head:
+        return Kind("world", "STL")
+    if head.startswith(b"{"):
+        is_gltf = b'"asset"' in data[:100_000]
+        return Kind("world", "glTF") if is_gltf else Kind("json", "JSON", "save the points as CSV")
+    lines = [line.strip() for line in head.splitlines()[:40]]
+    lines = [line for line in lines if line and not line.startswith(b"#")]
+    if len(lines) > 1 and all(OBJ_LINE.match(line) for line in lines[:-1]):  # the last one may be cut
+        return Kind("world", "OBJ")
+    return None
 
 
 def refuse_other_kinds(path: Path) -> None:
@@ -31,19 +110,16 @@ def refuse_other_kinds(path: Path) -> None:
     suffix, head = path.suffix.lower(), head_of(path)
     if not head:
         raise FileError(f"{path} is empty (0 bytes); copy or export it again")
-    if is_lfs_pointer(head):
-        raise FileError(f"{path} is a pointer of Git LFS, not the file itself; run: git lfs pull")
+    kind = kind_of(head)
+    if kind is POINTER:
+        raise FileError(f"{path} is {POINTER.name}; {POINTER.remedy}")
     if suffix in CLOUDS:
         raise FileError(f"{path} is a point cloud{_count_of_lines(path)}; {MAKE_A_MESH}")
     if program := PROGRAMS.get(suffix) or _program_of(head):
         raise FileError(f"{path} cannot be read as {suffix or 'this kind'}; export it as GLB from {program}")
-    if head.startswith(ARCHIVES):
-        raise FileError(f"{path} is a compressed archive; unpack it and give the mesh that is in it")
-    if re.match(rb"\s*(<!doctype html|<html)", head, re.IGNORECASE):
-        raise FileError(f"{path} is a web page, not a mesh (was a link saved in its place?); download the file itself")
-    if head.startswith(IMAGES):
-        raise FileError(f"{path} is an image; give the mesh of a world")
-    if suffix == ".csv" or (suffix == ".bin" and looks_like_route(path)):
+    if kind is not None and kind.group in REFUSED:
+        raise FileError(f"{path} is {REFUSED[kind.group].format(kind.name)}")
+    if suffix == ".csv" or (suffix == ".bin" and path.stat().st_size % 8 == 0 and looks_like_route(numbers_in(path))):
         raise FileError(
             f"{path} seems to be a route or a table, not a world; give it with --route, and a mesh as the world"
         )
@@ -55,53 +131,49 @@ def head_of(path: Path) -> bytes:
         return file.read(HEAD)
 
 
+def numbers_in(path: Path) -> Float[np.ndarray, " n"]:
+    """The numbers of an AntWorld `.bin`."""
+    return np.fromfile(path, dtype="<f8")
+
+
 def is_lfs_pointer(content: bytes) -> bool:
     """Whether a file holds only the pointer of Git LFS to its content."""
-    return content.startswith(LFS)
+    return kind_of(content) is POINTER
 
 
-def looks_like_world(path: Path) -> bool:
-    """Whether a file holds a mesh or an AntWorld world, by its content; for readers of other files that are given one by mistake."""
-    head = head_of(path)
-    if head.startswith((b"glTF", b"ply\n", b"ply\r")) or (head.startswith(b"solid") and b"facet" in head):
-        return True
-    if re.search(rb"(?m)^v[ \t]+\S+[ \t]+\S+[ \t]+\S+", head) and re.search(
-        rb"(?m)^(v|vt|vn|f|o|mtllib|usemtl)[ \t]", head
-    ):
-        return True
-    if head.lstrip()[:1] == b"{" and b'"asset"' in head:
-        return True
-    planes = _planes(path, 12)
-    return planes is not None and _are_colours(planes[9:]) and not looks_like_route(path)
+def looks_like_route(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether the numbers of a `.bin` that is given as a world are those of an AntWorld route. In doubt they are not.
 
-
-def looks_like_route(path: Path) -> bool:
-    """Whether a `.bin` holds an AntWorld route: x and y (cm) and headings (degrees), one array after the other."""
-    planes = _planes(path, 3)
-    if planes is None or planes.shape[1] < 2:
+    A route has x and y (cm) and headings (degrees), one array after the other.
+    """
+    if len(numbers) < 6 or len(numbers) % 3:
         return False
-    whole = _planes(path, 12)
-    if whole is not None and _are_colours(whole[9:]):
+    colours = numbers.reshape(12, -1)[9:] if len(numbers) % 12 == 0 else None
+    if colours is not None and _are_colours(colours):
         return False
+    planes = numbers.reshape(3, -1)
     x, y, heading = planes
-    steps = np.hypot(np.diff(x), np.diff(y))
-    return bool(
-        np.isfinite(planes).all()
-        and (np.abs(heading) <= 720).all()
-        and np.ptp(x) + np.ptp(y) > 0
-        and _smooth(x, y, steps)
-    )
+    if not np.isfinite(planes).all() or (np.abs(heading) > 720).any():
+        return False
+    extent, steps = np.ptp(planes[:2], axis=1), np.hypot(np.diff(x), np.diff(y))
+    return bool(extent.any() and (len(steps) < 8 or np.median(steps) < 0.25 * np.hypot(*extent)))
 
 
-def _smooth(x: np.ndarray, y: np.ndarray, steps: np.ndarray) -> bool:
-    """Whether the steps of a path are small against its extent; where there are few points, any."""
-    return len(steps) < 8 or float(np.median(steps)) < 0.25 * float(np.hypot(np.ptp(x), np.ptp(y)))
+def looks_like_world(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether the numbers of a `.bin` that is given as a route are those of an AntWorld world. In doubt they are not.
 
-
-def _planes(path: Path, count: int) -> np.ndarray | None:
-    """The arrays of float64 in an AntWorld file, or None where its size does not fit."""
-    size = path.stat().st_size
-    return np.fromfile(path, dtype="<f8").reshape(count, -1) if size and size % (8 * count) == 0 else None
+    A world has small triangles, with colours from 0 to 1 that differ.
+    """
+    if not len(numbers) or len(numbers) % 12:
+        return False
+    planes = numbers.reshape(12, -1)
+    if not np.isfinite(planes).all() or not _are_colours(planes[9:]) or not np.ptp(planes[9:]):
+        return False
+    with np.errstate(all="ignore"):
+        x, y, z = planes[:9].reshape(3, 3, -1)
+        size = np.median([np.ptp(each, axis=0) for each in (x, y)], axis=1)  # of most triangles
+        extent = np.array([np.ptp(x), np.ptp(y)])
+        return bool((size <= 0.2 * extent.max()).all() and np.ptp(z) <= 2 * extent.max())
 
 
 def _are_colours(values: np.ndarray) -> bool:

@@ -126,6 +126,11 @@ def convert(poses: Float[np.ndarray, "n 3"], convention: str, read_as: str = "cc
     return np.column_stack([poses[:, :2], wrap_angle(CONVENTIONS[convention].heading(numbers))])
 
 
+def of_radians(convention: str) -> str:
+    """The convention of headings that a name means where their unit was read: they are not taken for degrees."""
+    return {"radians": "ccw", "radians-bearing": "bearing"}.get(convention, convention)
+
+
 def path_directions(xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
     """Direction from each point to the next other one (rad); the last ones keep that of the one before, 0 where there is none."""
     step = np.diff(xy, axis=0)

@@ -1,21 +1,22 @@
 """What the names of a table's columns mean for a route: which hold x, y and the heading, and in which unit."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .errors import FileError, SettingError
+from .meshes.reading import UNITS
 
 LENGTHS = {  # names of units: metres, and what they are called in messages
     name: (metres, label)
     for metres, label, names in (
-        (1.0, "metres", "m metre metres meter meters"),
-        (1e-3, "millimetres", "mm millimetre millimetres millimeter millimeters"),
-        (1e-2, "centimetres", "cm centimetre centimetres centimeter centimeters"),
+        (UNITS["m"], "metres", "m metre metres meter meters"),
+        (UNITS["mm"], "millimetres", "mm millimetre millimetres millimeter millimeters"),
+        (UNITS["cm"], "centimetres", "cm centimetre centimetres centimeter centimeters"),
         (1e3, "kilometres", "km kilometre kilometres kilometer kilometers"),
-        (0.0254, "inches", "in inch inches"),
-        (0.3048, "feet", "ft foot feet"),
+        (UNITS["in"], "inches", "in inch inches"),
+        (UNITS["ft"], "feet", "ft foot feet"),
     )
     for name in names.split()
 }
@@ -127,10 +128,16 @@ def find_columns(names: list[str]) -> dict[str, tuple[int, Column]]:
             raise FileError(f"columns {numbers} are all called {same[0][1].name!r}; rename all but one")
         if same:
             found[axis] = same[0]
-    if {"X [mm]", "Heading [degrees]"} <= set(names) and "heading" in found:  # as in image databases of the BoB format
+    if "heading" in found:
         index, column = found["heading"]
-        found["heading"] = index, Column(**{**vars(column), "bearing": True})
+        found["heading"] = index, as_of_database(column, names)
     return found
+
+
+def as_of_database(heading: Column, names: list[str]) -> Column:
+    """A column of headings, which are bearings where the names are those of an image database of the BoB format."""
+    is_database = {"X [mm]", "Heading [degrees]"} <= set(names)
+    return replace(heading, bearing=True) if is_database else heading
 
 
 def parse_columns(text: str) -> list[str]:

@@ -12,7 +12,7 @@ from .atomic import replacing
 from .errors import FileError, InputError, SettingError
 from .geometry import Route
 from .heading_names import HEADINGS
-from .headings import Diagnosis, convert, diagnose, path_directions
+from .headings import Diagnosis, convert, diagnose, of_radians, path_directions
 from .route_points import Points, read_points
 from .route_smoothing import jitter, smoothed
 
@@ -79,8 +79,8 @@ def _route(path: Path, points: Points, headings: str, smooth: float) -> Route:
         return Route(np.column_stack([xy, path_directions(xy)]))
     read_as = "bearing" if points.bearing else "ccw"
     poses = np.column_stack([points.xy, heading])
-    if points.radians and headings in ("radians", "radians-bearing"):
-        headings = {"radians": "ccw", "radians-bearing": "bearing"}[headings]  # they are radians already
+    if points.radians:
+        headings = of_radians(headings)
     if headings in ("auto", "as-is"):
         poses = convert(poses, read_as)
     else:
@@ -126,14 +126,20 @@ def _remark_positions(path: Path, points: Points, route: Route, smooth: float) -
     if points.unstated and extent > LARGE:
         logger.warning(
             "%s: %s have no unit; taken as metres, the route is %.4g m wide. If they are millimetres, give --columns 'x [mm],y [mm]', with "
-            "the other columns in their order", path, points.unstated, extent,
-        )  # fmt: skip
+            "the other columns in their order",
+            path,
+            points.unstated,
+            extent,
+        )
     noise, step = jitter(route.xy), float(np.median(np.diff(route.arc)))
     if not smooth and noise > JITTERY * step:
         logger.warning(
             "%s: positions jitter by about %.2g m at steps of %.2g m: length and directions are not exact; --smooth-m %.1g averages them",
-            path, noise, step, 10 * noise,
-        )  # fmt: skip
+            path,
+            noise,
+            step,
+            10 * noise,
+        )
 
 
 def write_route(route: Route, path: str | os.PathLike) -> None:

@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from .contents import WORLD, described
 from .errors import FileError, SettingError
+from .file_kinds import kind_of, looks_like_world
 from .route_arrays import read_mat, read_npy, read_npz
 from .route_columns import Column, chosen_column, find_columns, parse_columns
 from .route_tables import columns_of, decode, read_table
 
 logger = logging.getLogger(__name__)
 
+WORLD = "it is not a route: it is a world ({}); give it as --world"
 MAX_GAPS = 0.05  # of the rows may lack a number
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log", "")
 
@@ -60,14 +61,13 @@ def read_points(path: Path, columns: str | None) -> Points:
         return _of_arrays(read_npy(data), columns)
     if suffix == ".npz" and data.startswith(b"PK"):
         return _of_arrays(read_npz(data), columns)
-    if data.startswith(b"MATLAB") or (suffix == ".mat" and described(data) is None):
+    if data.startswith(b"MATLAB") or (suffix == ".mat" and kind_of(data) is None):
         return _of_arrays(read_mat(data), columns)
     if suffix == ".bin":
         if columns is not None:
             raise SettingError("--columns are for tables and arrays; an AntWorld .bin has none")
         return _of_planes(data)
-    if sentence := described(data):
-        raise FileError(f"it is not a route: {sentence}")
+    _refuse_other_kinds(data)
     if suffix not in TEXT_SUFFIXES and not suffix[1:].isdigit():
         raise FileError(f"unknown kind of route {suffix!r}; give .csv, .txt, .mat, .npy or AntWorld .bin")
     return _of_text(decode(data), columns)
@@ -107,30 +107,25 @@ def _of_columns(columns: dict[str, Column], values: Float[np.ndarray, "axes n"])
 
 def _of_planes(data: bytes) -> Points:
     """The points in an AntWorld .bin: x (cm), y (cm) and heading (degrees), one after the other."""
-    if sentence := described(data) if len(data) % 24 else None:
-        raise FileError(f"it is not a route: {sentence}")
     if len(data) % 24:
+        _refuse_other_kinds(data)
         raise FileError(f"it has {len(data)} bytes; an AntWorld route has a multiple of 24 (is it truncated?)")
     planes = np.frombuffer(data, dtype="<f8")
-    if is_world(planes):
-        raise FileError(f"it is not a route: {WORLD.format('AntWorld .bin')}")
+    if looks_like_world(planes):
+        raise FileError(WORLD.format("AntWorld .bin"))
     x, y, heading = planes.reshape(3, -1)
     with np.errstate(all="ignore"):  # any bytes are numbers
         return Points(np.column_stack([x, y]) / 100, np.radians(heading), planes=True)
 
 
-def is_world(planes: Float[np.ndarray, " n"]) -> bool:
-    """Whether the numbers of an AntWorld .bin are those of a world: small triangles, with colours from 0 to 1 that differ."""
-    if len(planes) % 12:
-        return False
-    columns = planes.reshape(12, -1)
-    if not np.isfinite(columns).all() or columns[9:].min() < 0 or columns[9:].max() > 1 or not np.ptp(columns[9:]):
-        return False
-    with np.errstate(all="ignore"):
-        x, y, z = columns[:9].reshape(3, 3, -1)
-        size = np.median([np.ptp(each, axis=0) for each in (x, y)], axis=1)  # of most triangles
-        extent = np.array([np.ptp(x), np.ptp(y)])
-        return bool((size <= 0.2 * extent.max()).all() and np.ptp(z) <= 2 * extent.max())
+def _refuse_other_kinds(data: bytes) -> None:
+    """Refuse a file that is known to be something else than a table, with what it is. Raises FileError."""
+    kind = kind_of(data)
+    if kind is not None:
+        is_world = kind.group == "world"
+        raise FileError(
+            WORLD.format(kind.name) if is_world else f"it is not a route: it is {'; '.join(filter(None, kind[1:]))}"
+        )
 
 
 def _of_arrays(arrays: dict[str, np.ndarray], columns: str | None) -> Points:

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int64
 
 from .errors import InputError
+from .geometry import place_text
 
 MAX_SLOPE = np.radians(45.0)
 STEP_HEIGHT = 0.008  # m; an insect walks over what is lower
@@ -107,8 +108,8 @@ class Terrain:
     def problem(self, x: float, y: float) -> str:
         """Why nothing can stand at a position (m), for a message."""
         if self.is_steep(x, y):
-            return f"the mesh is steeper than {np.degrees(self.max_slope):g} degrees at ({x:g}, {y:g}) m"
-        return f"the mesh has no ground at ({x:g}, {y:g}) m"
+            return f"the mesh is steeper than {np.degrees(self.max_slope):g} degrees at {place_text(x, y)}"
+        return f"the mesh has no ground at {place_text(x, y)}"
 
     @cached_property
     def _ground(self) -> Float[np.ndarray, "k 3 3"]:

@@ -87,8 +87,10 @@ class Camera:
         if lens in ("ring", "panorama") and (self.top is None or self.bottom is None):
             log.warning(
                 "the elevations of the %s's edges are not known: %g to %g degrees are assumed; --top-deg and --bottom-deg give others",
-                lens, round(math.degrees(bottom), 3), round(math.degrees(top), 3),
-            )  # fmt: skip
+                lens,
+                round(math.degrees(bottom), 3),
+                round(math.degrees(top), 3),
+            )
         mapping = self._lens(lens, pictures, top, bottom)
         usual = _usual_size(mapping, top, bottom)
         across = self.width or usual[0]
@@ -116,9 +118,14 @@ class Camera:
             found = find_ring(pictures)
             log.warning(
                 "found a ring with --centre %.1f,%.1f --inner-px %.1f --outer-px %.1f (%.0f %% of its edge seen)%s",
-                *found.centre, found.inner, found.outer, 100 * found.seen,
-                "; its centre is not dark, so that the inner radius may be larger" if inner is None and found.inner == 0 else "",
-            )  # fmt: skip
+                *found.centre,
+                found.inner,
+                found.outer,
+                100 * found.seen,
+                "; its centre is not dark, so that the inner radius may be larger"
+                if inner is None and found.inner == 0
+                else "",
+            )
             centre = found.centre if centre is None else centre
             inner, outer = found.inner if inner is None else inner, found.outer if outer is None else outer
         return Ring(centre=centre, inner=inner, outer=outer, flip=self.flip, top=top, bottom=bottom, **turned)

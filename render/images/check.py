@@ -4,7 +4,6 @@ import logging
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +12,14 @@ from jaxtyping import Float
 
 from tussock.world.errors import FileError
 from tussock.world.geometry import wrap_angle
-from tussock.world.headings import Diagnosis, convert, diagnose
+from tussock.world.headings import CONVENTIONS, diagnose
 
-from .database import KINDS, Database, check_video_name, frames_of_rows, guessed_metadata, is_outside
-from .entries import ENTRIES, FRAME, is_grid, read_entries
+from .database import assembled, check_kind, guessed_metadata, is_outside, stated_metadata
+from .entries import ENTRIES, FRAME, read_entries
 from .flow import grid_axes_error
 from .inspection import Inspection, Problem, inspected
 from .lens_metadata import stated_unwrapping
-from .metadata import METADATA, read_metadata
+from .metadata import METADATA, group_in
 from .pictures import SUFFIXES, check_content
 
 logger = logging.getLogger(__name__)
@@ -45,34 +44,25 @@ def check_database(folder: str | os.PathLike, headings: str = "auto") -> list[Pr
     folder = Path(folder)
     if not (folder / ENTRIES).is_file():
         raise FileError(f"there is no {folder / ENTRIES}; give the folder of an image database")
-    problems, metadata = [], {}
+    problems: list[Problem] = []
+    metadata: dict[str, Any] | None = {}
     try:
-        metadata = read_metadata(folder / METADATA) if os.path.lexists(folder / METADATA) else {}
+        metadata = stated_metadata(folder)
+        if metadata is not None:
+            check_kind(folder, metadata)
     except FileError as error:
         problems.append(Problem("damaged-metadata", METADATA, str(error)))
     try:
         entries = read_entries(folder / ENTRIES)
     except FileError as error:
         return [*problems, Problem("damaged-entries", ENTRIES, str(error))]
-    if not metadata and not problems:
+    if metadata is None:
         metadata = guessed_metadata(folder, entries.columns)
-    kind = metadata.get("type")
-    if metadata and kind not in KINDS:
-        problems.append(Problem("damaged-metadata", METADATA, f"the type is {kind!r}, not {' or '.join(KINDS)}"))
-    if kind not in KINDS:
-        kind = "grid" if is_grid(entries.columns) else "route"
-    database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
-    database = replace(database, poses=convert(entries.poses, headings, "bearing"))
     try:
-        if database.frames is not None:
-            check_video_name(folder, metadata)
-            video = folder / metadata["videoFile"]
-            database = replace(database, frames=frames_of_rows(video, database.frames))
-        inspection = inspected(database)
+        inspection = inspected(assembled(folder, entries, metadata, headings), headings)
     except FileError as error:  # about the video
         return [*problems, Problem("unreadable-video", METADATA, str(error))]
-    checks = [check for check in CHECKS if check is not check_headings or headings != "as-is"]
-    return problems + [problem for check in checks for problem in check(inspection)]
+    return problems + [problem for check in CHECKS for problem in check(inspection)]
 
 
 def check_files(inspection: Inspection) -> Iterator[Problem]:
@@ -94,11 +84,14 @@ def check_files(inspection: Inspection) -> Iterator[Problem]:
         elif inspection.shapes[row] is None:
             yield Problem("unreadable-image", name, _why_unreadable(folder / name))
         lines.setdefault(name, inspection.database.lines[row])
-    tussock = inspection.database.metadata.get("tussock")
-    eye = tussock.get("eye") if isinstance(tussock, dict) else None
-    mask = eye.get("mask") if isinstance(eye, dict) else None
+    mask = group_in(inspection.database.metadata, "tussock", "eye").get("mask")
     for path in sorted(folder.iterdir()):
-        if path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.name not in {*lines, mask}:
+        if (
+            path.suffix.lower() in SUFFIXES
+            and not path.name.startswith(".")
+            and path.name not in lines
+            and path.name != mask
+        ):
             yield Problem("unlisted-image", path.name, "no row names it")
 
 
@@ -158,10 +151,10 @@ def check_headings(inspection: Inspection) -> Iterator[Problem]:
 
     Headings that have nothing to do with the path, such as those of a drone that faces north all the time, are logged as a remark.
     """
-    if inspection.database.kind != "route":
+    if inspection.database.kind != "route" or inspection.headings == "as-is":
         return
     poses = inspection.database.poses
-    diagnosis = diagnose(poses, "bearing")
+    diagnosis = diagnose(poses, inspection.headings if inspection.headings in CONVENTIONS else "bearing")
     if diagnosis.kind == "convention":
         yield Problem("heading-convention", ENTRIES, f"{diagnosis}; {diagnosis.flags}")
     elif str(diagnosis):
@@ -194,7 +187,7 @@ def heading_convention_error(poses: Float[np.ndarray, "n 3"]) -> str | None:
 
     None if they follow the path, if they have nothing to do with it, and if that is undetermined.
     """
-    diagnosis: Diagnosis = diagnose(poses, "bearing")
+    diagnosis = diagnose(poses, "bearing")
     return str(diagnosis) if diagnosis.kind == "convention" else None
 
 
@@ -262,8 +255,7 @@ def check_axes(inspection: Inspection) -> Iterator[Problem]:
 
 def _numbers(metadata: dict[str, Any], group: str, name: str, at_least: int = 2) -> list[float] | None:
     """Numbers from metadata, or None where there are not enough, or anything else."""
-    members = metadata.get(group)
-    values = members.get(name) if isinstance(members, dict) else None
+    values = group_in(metadata, group).get(name)
     values = values if isinstance(values, list) else [values]
     numbers = [float(value) for value in values if isinstance(value, int | float) and np.isfinite(value)]
     return numbers if len(numbers) == len(values) >= at_least else None

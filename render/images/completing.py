@@ -1,6 +1,7 @@
 """Writing a database picture by picture, into a folder that can be completed after any interruption."""
 
 import os
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -12,12 +13,32 @@ from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
 from tussock.world.progress import Progress
 
+from ..eye import Eye
 from .database import make_folder
 from .entries import ENTRIES, FILENAME, Columns, read_entries, write_entries
-from .metadata import METADATA, read_metadata, write_metadata
+from .metadata import METADATA, group_in, read_metadata, write_metadata
 from .pictures import Picture, encoded
 
 BATCH = 64  # pictures that are made while those before them are encoded
+
+
+def metadata_of(
+    kind: str, camera: str, eye: Eye, tussock: dict[str, Any], grid: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """The metadata of a database of panoramas.
+
+    Args:
+        kind: route or grid.
+        camera: Its name.
+        eye: Of the size of the panoramas.
+        tussock: What decides the images, for `start_or_resume`.
+        grid: What the metadata say about a grid.
+    """
+    metadata: dict[str, Any] = {"time": time.strftime("%Y-%m-%d %H:%M:%S"), "type": kind}
+    if grid is not None:
+        metadata["grid"] = grid
+    described = {"name": camera, "resolution": [eye.width, eye.height], "isPanoramic": 0}
+    return metadata | {"camera": described, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": {"version": 1} | tussock}
 
 
 def start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
@@ -33,8 +54,8 @@ def start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
     if (folder / METADATA).is_file():
         theirs = read_metadata(folder / METADATA)
         for name, value in {"type": metadata["type"], **metadata["tussock"]}.items():
-            group = theirs if name == "type" else theirs.get("tussock")
-            if not isinstance(group, dict) or group.get(name) != value:
+            group = theirs if name == "type" else group_in(theirs, "tussock")
+            if group.get(name) != value:
                 raise FileError(f"{folder} holds an image database that differs in its {name}; give another folder")
     elif folder.exists() and (not folder.is_dir() or set(folder.iterdir()) - set(_partial_files(folder))):
         raise FileError(f"{folder} exists already and is not an image database; give a new folder")

@@ -20,7 +20,7 @@ from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
 from tussock.world.headings import convert
 
-from .entries import ENTRIES, Columns, is_grid, read_entries, write_entries
+from .entries import ENTRIES, Columns, Entries, is_grid, read_entries, write_entries
 from .lens_metadata import needs_unwrapping, stated_unwrapping
 from .metadata import METADATA, read_metadata, write_metadata
 from .pictures import Picture, check_exists, read_image
@@ -148,8 +148,7 @@ class Database:
         names = [str(self.metadata.get("videoFile"))] if self.frames else list(dict.fromkeys(filter(None, self.names)))
         for name in names:
             check_exists(self.folder / name)
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise FileError(f"{folder} exists already and is not empty; give a new folder")
+        check_new(folder)
         make_folder(folder)
         write_metadata(folder / METADATA, self.metadata)
         for name in names:
@@ -177,22 +176,40 @@ def read_database(folder: str | os.PathLike, headings: str = "auto") -> Database
     for name, line in zip(entries.names, entries.lines, strict=True):
         if name is not None and is_outside(folder, name):
             raise FileError(f"{folder / ENTRIES}, line {line}: {name!r} is not in the folder; name files inside it")
-    metadata = (
-        read_metadata(folder / METADATA)
-        if os.path.lexists(folder / METADATA)
-        else guessed_metadata(folder, entries.columns)
-    )
-    kind = metadata.get("type")
-    if kind not in KINDS:
-        raise FileError(f"{folder / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
+    metadata = stated_metadata(folder)
+    if metadata is None:
+        metadata = guessed_metadata(folder, entries.columns)
+    check_kind(folder, metadata)
+    return assembled(folder, entries, metadata, headings)
+
+
+def stated_metadata(folder: Path) -> dict[str, Any] | None:
+    """The metadata in a folder, None where there is no such file. Raises FileError for a damaged one."""
+    return read_metadata(folder / METADATA) if os.path.lexists(folder / METADATA) else None
+
+
+def check_kind(folder: Path, metadata: dict[str, Any]) -> None:
+    """Refuse metadata of anything else than a route or a grid. Raises FileError."""
+    if metadata.get("type") not in KINDS:
+        raise FileError(f"{folder / METADATA}: the type is {metadata.get('type')!r}; give {' or '.join(KINDS)}")
+
+
+def assembled(folder: Path, entries: Entries, metadata: dict[str, Any], headings: str) -> Database:
+    """The database of entries and metadata, whose kind is guessed where the metadata have none.
+
+    Raises:
+        FileError: The rows are frames, and the metadata name no video in the folder.
+        SettingError: For an unknown convention of headings.
+    """
+    kind = metadata["type"] if metadata.get("type") in KINDS else _guessed_kind(entries.columns)
     if entries.frames is not None:
         check_video_name(folder, metadata)
-        entries = replace(entries, frames=frames_of_rows(folder / metadata["videoFile"], entries.frames))
-    database = Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
-    return replace(database, poses=convert(entries.poses, headings, "bearing"))
+        entries = replace(entries, frames=_frames_of_rows(folder / metadata["videoFile"], entries.frames))
+    entries = replace(entries, poses=convert(entries.poses, headings, "bearing"))
+    return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
 
 
-def frames_of_rows(video: Path, numbers: tuple[int, ...]) -> tuple[int, ...]:
+def _frames_of_rows(video: Path, numbers: tuple[int, ...]) -> tuple[int, ...]:
     """The frame of each row. Some recorders write the counter of a tracker into `Frame`; their rows are the frames in order."""
     try:
         count = claimed_frames(video)
@@ -220,10 +237,14 @@ def check_video_name(folder: Path, metadata: dict[str, Any]) -> None:
 
 def guessed_metadata(folder: Path, columns: Columns) -> dict[str, Any]:
     """Metadata of a database that has none."""
-    kind = "grid" if is_grid(columns) else "route"
+    kind = _guessed_kind(columns)
     why = "it has grid columns" if kind == "grid" else "it has no grid columns"
     log.warning("%s has no %s; it is read as a %s, because %s", folder, METADATA, kind, why)
     return {"type": kind}
+
+
+def _guessed_kind(columns: Columns) -> str:
+    return "grid" if is_grid(columns) else "route"
 
 
 def is_transparent(picture: Picture) -> bool:
@@ -248,6 +269,12 @@ def is_outside(folder: Path, name: str) -> bool:
         return not (folder / name).resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):  # a name that is too long or has a NUL; links in a circle
         return True
+
+
+def check_new(folder: Path) -> None:
+    """Refuse a folder that holds anything. Raises FileError."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise FileError(f"{folder} exists already and is not empty; give a new folder")
 
 
 def make_folder(folder: Path) -> None:

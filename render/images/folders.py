@@ -21,7 +21,7 @@ from tussock.world.settings import shown
 from ..eye import Eye
 from .database import Database, read_database
 from .entries import ENTRIES
-from .metadata import METADATA
+from .metadata import METADATA, group_in
 
 log = logging.getLogger(__name__)
 
@@ -102,9 +102,8 @@ def _remark_on_elevations(folder: Path, eye: Eye) -> None:
 
 def _recorded_eye(database: Database) -> dict[str, Any]:
     """Fields of the eye that a database records, those that are not None; at least the size of the images."""
-    group = database.metadata.get("tussock")
-    recorded = group.get("eye") if isinstance(group, dict) else None
-    if not isinstance(recorded, dict):
+    recorded = group_in(database.metadata, "tussock", "eye")
+    if not recorded:
         height, width = first_view(database).shape[:2]
         return {"width": width, "height": height}
     names = {each.name for each in attrs.fields(Eye)}

@@ -3,12 +3,10 @@
 import hashlib
 import logging
 import os
-import time
 from pathlib import Path
 from typing import Any
 
 import attrs
-import cv2
 import numpy as np
 from jaxtyping import Bool
 
@@ -19,23 +17,17 @@ from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, choice, number, settings, text, whole
 
 from ..eye import Eye
+from ..mask import MIN_BRIGHT, fitted, read_mask
 from .camera import Camera
-from .completing import complete, missing_rows, start_or_resume
+from .completing import complete, metadata_of, missing_rows, start_or_resume
 from .database import KINDS, Database, check_video_name, read_database
 from .entries import ENTRIES, FILENAME, HEADING, Columns, X, Y, Z, format_decimal
-from .lens_metadata import needs_unwrapping, stated_unwrapping
-from .metadata import METADATA, read_metadata
-from .pictures import Picture, check_exists, encoded, read_image
-from .sources import (
-    Reference,
-    check_alike,
-    is_video_file,
-    label,
-    read_pictures,
-    sample,
-)
+from .lens_metadata import needs_unwrapping, stated_unwrapping, unwrapper_in
+from .metadata import METADATA, group_in, read_metadata
+from .pictures import Picture, encoded
+from .sources import is_video_file, label, read_panoramas, sample
 from .taken import Taken, taken_from_folder, taken_from_video
-from .track import read_track
+from .track import Track, read_track
 from .unwrapping import Unwrapping
 
 log = logging.getLogger(__name__)
@@ -103,10 +95,8 @@ def import_database(
     kind = settings.kind or str(origin.get("type", "route"))
     if kind not in KINDS:
         raise FileError(f"{source / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
-    track = track or source / ENTRIES
-    if not os.path.isfile(track):
-        raise FileError(f"there is no table {track} of where the pictures were taken; give one with --track")
-    rows = read_track(track, settings.columns, settings.unit, settings.headings, along_path=kind == "route")
+    rows = _rows(track or source / ENTRIES, kind, settings)
+    metadata_path = source / METADATA
     if origin.get("videoFile"):
         check_video_name(source, origin)
         source = source / str(origin["videoFile"])
@@ -115,38 +105,22 @@ def import_database(
     else:
         taken = taken_from_folder(source, rows, settings.every)
     pictures = sample(source, taken.references)
-    camera = attrs.evolve(
-        camera, **{edge: each for edge, each in _edges_of(origin).items() if getattr(camera, edge) is None}
-    )
     shape = pictures[0].shape
-    stated = (
-        camera.lens == "auto"
-        and camera.centre is None
-        and "unwrapper" in origin
-        and needs_unwrapping(origin, shape[0], shape[1])
-    )
-    unwrapping = (
-        stated_unwrapping(origin, shape[0], shape[1], source / METADATA) if stated else camera.unwrapping(pictures)
-    )
+    unwrapping = _unwrapping(origin, metadata_path, camera, pictures)
     seen = _seen(unwrapping, settings.mask, shape)
     height = float(np.median(taken.z)) if settings.height is None else settings.height
     eye = Eye(width=unwrapping.width, height=unwrapping.height, top=unwrapping.top, bottom=unwrapping.bottom, z=height)
     columns, lattice = _columns(taken, kind, settings.format)
-    metadata = _metadata(
-        kind, lattice, eye, _digest(source, taken, unwrapping, seen, settings), len(taken.references), seen
-    )
-    start_or_resume(out, metadata)
+    stored = eye.plain() | {"samples": eye.rays} | ({} if seen is None else {"mask": MASK})
+    digest = _digest(source, taken, unwrapping, seen, settings)
+    tussock = {"source": digest, "views": len(taken.references), "eye": stored}
+    start_or_resume(out, metadata_of(kind, "imported", eye, tussock, lattice))
     if seen is not None:
         with replacing(out / MASK) as partial:
-            partial.write_bytes(encoded(np.repeat(np.uint8(255) * seen[..., None], 3, axis=2), ".png"))
+            partial.write_bytes(encoded(_grey(seen), ".png"))
     missing = missing_rows(out, columns)
     missing.sort(key=lambda row: taken.references[row] if isinstance(taken.references[row], int) else row)
-
-    def panorama(reference: Reference, picture: Picture) -> Picture:
-        check_alike(source, reference, picture, shape)
-        return unwrapping(picture)
-
-    panoramas = read_pictures(source, [taken.references[row] for row in missing], panorama)
+    panoramas = read_panoramas(source, [taken.references[row] for row in missing], unwrapping, shape)
     complete(out, columns, missing, lambda rows: [next(panoramas) for _ in rows], progress, settings.quality)
     return read_database(out), len(missing)
 
@@ -157,12 +131,30 @@ def _metadata_of(source: Path) -> dict[str, Any]:
     return read_metadata(source / METADATA) if is_database else {}
 
 
-def _edges_of(origin: dict[str, Any]) -> dict[str, float]:
-    """The elevations of the edges of a database's panoramas, as far as it states them."""
-    tussock = origin.get("tussock")
-    eye = tussock.get("eye") if isinstance(tussock, dict) else None
-    values = {edge: eye.get(edge) for edge in ("top", "bottom")} if isinstance(eye, dict) else {}
-    return {edge: float(value) for edge, value in values.items() if isinstance(value, int | float)}
+def _rows(path: Path, kind: str, settings: Import) -> Track:
+    """Where the pictures of a route or a grid were taken. Raises FileError, SettingError."""
+    if not os.path.isfile(path):
+        raise FileError(f"there is no table {path} of where the pictures were taken; give one with --track")
+    return read_track(path, settings.columns, settings.unit, settings.headings, along_path=kind == "route")
+
+
+def _unwrapping(origin: dict[str, Any], path: Path, camera: Camera, pictures: list[Picture]) -> Unwrapping:
+    """How panoramas are made of pictures.
+
+    Args:
+        origin: The metadata of the database that they are from, or nothing. What they state holds where the camera says nothing else.
+        path: The file of the metadata.
+        camera: What is given.
+        pictures: Some of the pictures.
+    """
+    height, width = pictures[0].shape[:2]
+    given = camera.lens != "auto" or camera.centre is not None
+    if not given and unwrapper_in(origin) and needs_unwrapping(origin, height, width):
+        return stated_unwrapping(origin, height, width, path)
+    eye = group_in(origin, "tussock", "eye")
+    edges = {edge: eye.get(edge) for edge in ("top", "bottom") if getattr(camera, edge) is None}
+    edges = {edge: float(value) for edge, value in edges.items() if isinstance(value, int | float)}
+    return attrs.evolve(camera, **edges).unwrapping(pictures)
 
 
 def _seen(unwrapping: Unwrapping, mask: Path | None, shape: tuple[int, ...]) -> Bool[np.ndarray, "height width"] | None:
@@ -174,17 +166,15 @@ def _seen(unwrapping: Unwrapping, mask: Path | None, shape: tuple[int, ...]) -> 
             100 * (1 - seen.mean()),
         )
     if mask is not None:
-        check_exists(mask)
-        drawn = read_image(mask)
-        if drawn.shape[:2] == shape[:2]:
-            drawn = unwrapping(drawn)
+        drawn = read_mask(mask)
+        if drawn.shape == shape[:2]:
+            drawn = unwrapping(_grey(drawn))[..., 0] >= MIN_BRIGHT
         elif abs(drawn.shape[1] * seen.shape[0] / (drawn.shape[0] * seen.shape[1]) - 1) > 0.02:
             raise FileError(
                 f"{mask} is {drawn.shape[1]} x {drawn.shape[0]}; give a mask of the size of the pictures ({shape[1]} x {shape[0]}) "
                 f"or of the panoramas ({seen.shape[1]} x {seen.shape[0]})"
             )
-        drawn = cv2.resize(np.ascontiguousarray(drawn[..., :3]), seen.shape[::-1], interpolation=cv2.INTER_AREA)
-        seen &= drawn.max(axis=2) >= 128
+        seen &= fitted(drawn, unwrapping.width, unwrapping.height)
     if not seen.any():
         raise SettingError(
             "the mask covers the whole panorama; a mask is white where the eye sees, and black where it is covered"
@@ -239,20 +229,6 @@ def _lattice(mm: np.ndarray) -> tuple[float, float, np.ndarray] | None:
     return (float(values[0]), spacing, np.rint(index).astype(int)) if regular else None
 
 
-def _metadata(
-    kind: str, lattice: dict[str, Any] | None, eye: Eye, digest: str, views: int, seen: np.ndarray | None
-) -> dict[str, Any]:
-    stored: dict[str, Any] = eye.plain() | {"samples": eye.rays}
-    if seen is not None:
-        stored["mask"] = MASK
-    metadata: dict[str, Any] = {"time": time.strftime("%Y-%m-%d %H:%M:%S"), "type": kind}
-    if lattice is not None:
-        metadata["grid"] = lattice
-    camera = {"name": "imported", "resolution": [eye.width, eye.height], "isPanoramic": 0}
-    tussock = {"version": 1, "source": digest, "views": views, "eye": stored}
-    return metadata | {"camera": camera, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": tussock}
-
-
 def _digest(
     source: Path, taken: Taken, unwrapping: Unwrapping, seen: np.ndarray | None, settings: ImportSettings
 ) -> str:
@@ -263,3 +239,8 @@ def _digest(
         parts.append(os.path.getsize(source))
     scene = repr(parts).encode() + taken.poses.tobytes() + taken.z.tobytes() + (b"" if seen is None else seen.tobytes())
     return hashlib.sha256(scene).hexdigest()
+
+
+def _grey(visible: Bool[np.ndarray, "height width"]) -> Picture:
+    """A mask as a picture, white where the eye sees."""
+    return np.repeat(np.uint8(255) * visible[..., None], 3, axis=2)

@@ -36,10 +36,12 @@ class Inspection:
     Attributes:
         database: The database.
         shapes: Shapes of the images of all rows, None where an image cannot be read.
+        headings: How its headings were read, as `read_database` takes it.
     """
 
     database: Database
     shapes: list[tuple[int, ...] | None]
+    headings: str
 
     @property
     def usual_shape(self) -> tuple[int, ...] | None:
@@ -57,18 +59,18 @@ class Inspection:
         return f"{ENTRIES}, line {self.database.lines[row]}"
 
 
-def inspected(database: Database) -> Inspection:
+def inspected(database: Database, headings: str) -> Inspection:
     """Read all images. Raises FileError for a video that cannot be read at all."""
     if database.frames is not None and database.video is not None:
         count = count_frames(database.video)
         shape = next(frames(database.video, [0]))[1].shape if count else None
-        return Inspection(database, [shape if number < count else None for number in database.frames])
+        return Inspection(database, [shape if number < count else None for number in database.frames], headings)
     with ThreadPoolExecutor() as pool:
         images = list(pool.map(lambda name: _examined(database.folder, name), database.names))
     shapes = [shape for shape, _ in images]
     if any(shape and shape[2] == 4 for shape in shapes) and not any(transparent for _, transparent in images):
         log_opaque(database.folder)
-    return Inspection(database, shapes)
+    return Inspection(database, shapes, headings)
 
 
 def _examined(folder: Path, name: str | None) -> tuple[tuple[int, ...] | None, bool]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from tussock.world.errors import FileError, SettingError
 
+from .metadata import group_in
 from .unwrapping import Ring, Unwrapping
 
 MIN_ASPECT = 2.0  # width by height from which a picture of a panoramic camera is taken to be unwrapped already
@@ -21,16 +22,17 @@ def needs_unwrapping(metadata: dict[str, Any], height: int, width: int) -> bool:
     stated = metadata.get("needsUnwrapping")
     if isinstance(stated, int | float | str):
         return _is_true(stated)
-    camera = metadata.get("camera")
-    panoramic = isinstance(camera, dict) and _is_true(camera.get("isPanoramic"))
-    return panoramic and width < MIN_ASPECT * height
+    return _is_true(group_in(metadata, "camera").get("isPanoramic")) and width < MIN_ASPECT * height
+
+
+def unwrapper_in(metadata: dict[str, Any]) -> dict[str, Any]:
+    """What metadata say about unwrapping; empty where that is nothing."""
+    return group_in(metadata, "unwrapper") or group_in(metadata, "imageInput", "unwrapper")
 
 
 def stated_unwrapping(metadata: dict[str, Any], height: int, width: int, path: Path) -> Unwrapping:
     """How the metadata says that raw pictures of a size are unwrapped. Raises FileError where it does not, which names its path."""
-    above = metadata.get("imageInput")
-    group = metadata.get("unwrapper") or (above.get("unwrapper") if isinstance(above, dict) else None)
-    group = group if isinstance(group, dict) else {}
+    group = unwrapper_in(metadata)
     centre = group.get("centre", group.get("center"))
     radii = [group.get("inner"), group.get("outer")]
     values = [*(centre if isinstance(centre, list) else [None]), *radii]

@@ -43,6 +43,14 @@ def read_metadata(path: Path) -> dict[str, Any]:
     return root
 
 
+def group_in(metadata: dict[str, Any], *names: str) -> dict[str, Any]:
+    """A group of metadata, or one inside it; empty where the metadata have anything else there."""
+    for name in names:
+        inner = metadata.get(name)
+        metadata = inner if isinstance(inner, dict) else {}
+    return metadata
+
+
 def read_storage(path: Path) -> dict[str, Any]:
     """Read a file of OpenCV's FileStorage: YAML, JSON or XML. Raises FileError; the message names the line if it is known."""
     check_content(path)

@@ -8,10 +8,10 @@ from tussock.world.errors import FileError, SettingError
 from tussock.world.progress import Progress, no_progress
 
 from .camera import Camera
-from .database import make_folder
+from .database import check_new, make_folder
 from .pictures import SUFFIXES, Picture, encoded
 from .ring_search import draw_ring
-from .sources import Reference, check_alike, frames_of, is_video_file, picture_names, read_pictures, sample
+from .sources import frames_of, is_video_file, picture_names, read_panoramas, sample
 from .unwrapping import Ring, Unwrapping
 
 FORMATS = (".png", ".jpg")
@@ -66,11 +66,8 @@ def unwrap_files(
     if not single:
         make_folder(out)
 
-    def panorama(reference: Reference, picture: Picture) -> Picture:
-        check_alike(folder, reference, picture, pictures[0].shape)
-        return unwrapping(picture)
-
-    for done, (file, made) in enumerate(zip(files, read_pictures(folder, references, panorama), strict=True), 1):
+    panoramas = read_panoramas(folder, references, unwrapping, pictures[0].shape)
+    for done, (file, made) in enumerate(zip(files, panoramas, strict=True), 1):
         _write(file, made, quality)
         progress(done, len(files))
     return unwrapping, len(files)
@@ -83,8 +80,7 @@ def _files(out: Path, references: list, single: bool, suffix: str) -> list[Path]
         if out.suffix.lower() not in FORMATS:
             raise FileError(f"{out}: a panorama is written as .png or .jpg")
         return [out]
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise FileError(f"{out} exists already and is not empty; give a new folder")
+    check_new(out)
     if isinstance(references[0], int):
         return [out / f"frame_{number:05d}{suffix}" for number in references]
     stems = [Path(name).stem for name in references]

@@ -9,23 +9,22 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from tussock.world.errors import FileError
+from tussock.world.file_kinds import head_of, is_lfs_pointer
 
 Picture = UInt8[np.ndarray, "_ _ _"]  # height, width, channels (RGB or RGBA)
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
 MAX_PIXELS = 8 * 10**7  # of an image, because a small file may claim any size; Pillow itself warns above 89 million
-LFS_POINTER = b"version https://git-lfs.github.com/spec/"  # the first line of a file that Git LFS did not fetch
 
 
 def check_content(path: Path) -> None:
     """Refuse a file that only points to its content in Git LFS. Raises FileError."""
     try:
-        with path.open("rb") as file:
-            begin = file.read(len(LFS_POINTER))
+        is_pointer = is_lfs_pointer(head_of(path))
     except OSError:
         return  # whatever reads the file reports this
-    if begin == LFS_POINTER:
+    if is_pointer:
         raise FileError(f"{path} is only a pointer of Git LFS, not the file itself; run git lfs pull in its repository")
 
 

@@ -21,10 +21,9 @@ from ..eye import Eye
 from ..poses import Poses, as_poses
 from .database import Database
 from .folders import eye_of, first_view, open_database, reach_of, world_of
+from .metadata import group_in
 
-CACHE_BYTES = (
-    256 * 2**20
-)  # of images that are kept after they were used: an agent stays near an entry for several steps
+CACHE_BYTES = 256 * 2**20  # of images that are kept once used: an agent stays near an entry for several steps
 SAME_PLACE = 1e-9  # m; entries nearer to each other than this have one position, and the heading decides
 BACKEND = "database"
 
@@ -199,7 +198,7 @@ def _check_shows_all(database: Database, eye: Eye) -> None:
 
     What tussock drew shows the full circle behind any mask. Rows that are hidden all around stay where they are. Raises FileError.
     """
-    if eye.mask is None or "world" in database.metadata.get("tussock", {}):
+    if eye.mask is None or "world" in group_in(database.metadata, "tussock"):
         return
     visible = eye.mask.visible()
     if (visible != visible[:, :1]).any():

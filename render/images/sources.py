@@ -112,6 +112,18 @@ def read_pictures(
             yield from pool.map(lambda name: made(name, read_image(source / str(name))), references[start : start + 32])
 
 
+def read_panoramas(
+    source: Path, references: Sequence[Reference], unwrapping: Callable[[Picture], Picture], shape: tuple[int, ...]
+) -> Iterator[Picture]:
+    """Read pictures in order, as `read_pictures`, and unwrap each. Raises FileError for one whose size is not that of a shape."""
+
+    def panorama(reference: Reference, picture: Picture) -> Picture:
+        check_alike(source, reference, picture, shape)
+        return unwrapping(picture)
+
+    return read_pictures(source, references, panorama)
+
+
 def is_video_file(path: Path) -> bool:
     """Whether a path is a video, and not a picture or a folder."""
     return os.path.isfile(path) and path.suffix.lower() not in SUFFIXES and is_video(path)

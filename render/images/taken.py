@@ -79,8 +79,10 @@ def _frame_clock(video: Path, track: Track, start: float | None) -> Float[np.nda
         begin = float(track.times[0]) if start is None else start
         log.warning(
             "%s: its first frame is taken to be of time %g s, with %g frames a second; --start-s gives another time",
-            video, begin, rate,
-        )  # fmt: skip
+            video,
+            begin,
+            rate,
+        )
         return (track.times - begin) * rate
     count = len(frames_of(video, 1))
     if count != len(track):

@@ -11,9 +11,9 @@ from jaxtyping import Float
 
 from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.heading_names import HEADINGS
-from tussock.world.headings import CONVENTIONS, convert, diagnose
-from tussock.world.route_columns import LENGTHS, Column, chosen_column, find_columns
-from tussock.world.route_tables import decode
+from tussock.world.headings import CONVENTIONS, convert, diagnose, of_radians
+from tussock.world.route_columns import LENGTHS, Column, as_of_database, chosen_column, find_columns
+from tussock.world.route_tables import COMMENTS, decode
 
 from .pictures import check_content
 
@@ -27,7 +27,6 @@ OTHERS = {  # names of columns that a route does not have
     "time": "time timestamp t stamp seconds elapsed",
 }
 SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-COMMENTS = ("#", "%", "//")
 MAX_BYTES = 5 * 10**8
 
 
@@ -110,9 +109,7 @@ def read_track(
     )
     heading = column = None
     if "heading" in found:
-        column = chosen_column(header[found["heading"]], "heading")
-        if {"X [mm]", "Heading [degrees]"} <= set(header):  # as in image databases of the BoB format
-            column = replace(column, bearing=True)
+        column = as_of_database(chosen_column(header[found["heading"]], "heading"), header)
         heading = column.factor * _numbers(path, lines, texts["heading"], "the heading")
     poses = _headed(path, np.column_stack([x, y]), heading, column, headings, along_path)
     return Track(path, lines, poses, z, names, frames, times)
@@ -257,8 +254,8 @@ def _headed(
     read_as = "bearing" if column.bearing else "ccw"
     if headings in CONVENTIONS:
         read_as = headings
-    if column.unit == "radians":  # they were not taken for degrees
-        read_as = {"radians": "ccw", "radians-bearing": "bearing"}.get(read_as, read_as)
+    if column.unit == "radians":
+        read_as = of_radians(read_as)
     poses = convert(np.column_stack([xy, heading]), read_as)
     if headings == "auto" and along_path:
         diagnosis = diagnose(poses, read_as)

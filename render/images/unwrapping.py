@@ -6,7 +6,6 @@ A lens maps directions to pixels. Directions are azimuths relative to ahead (rad
 
 import math
 from functools import lru_cache
-from typing import Protocol
 
 import attrs
 import cv2
@@ -25,14 +24,6 @@ MAX_SIZE = 32766  # pixels along a side that OpenCV's remap can address
 MAX_SAMPLES = 3 * 10**7  # looked up for one panorama
 MAX_STRIDE = 16  # samples along one side of a pixel
 MAX_PIXEL = 1e6
-
-
-class Lens(Protocol):
-    """What maps directions to pixels. It is hashable, so that the tables of a camera are made once."""
-
-    def pixels(self, azimuth: Float[np.ndarray, " width"], elevation: Float[np.ndarray, " height"]) -> Pixels:
-        """Where each direction is in the picture."""
-        ...
 
 
 @settings
@@ -118,12 +109,12 @@ class Panorama:
 
 
 @settings
-class Fisheye:
-    """A fisheye lens as OpenCV calibrates it (`cv2.fisheye`).
+class Calibrated:
+    """What calibrated lenses have in common.
 
     Attributes:
         matrix: fx, fy, cx, cy and the skew (pixels), of K.
-        distortion: k1 to k4, of D.
+        distortion: Four numbers, of D.
         looking: What the middle of the picture shows: up, down or ahead. Where it is up or down, the picture's upper side is ahead.
         offset: Where ahead is in the picture, clockwise from up (rad). Looking ahead: to the right of the middle.
         mirrored: The picture is a mirror image.
@@ -137,7 +128,12 @@ class Fisheye:
 
     def __attrs_post_init__(self):
         if len(self.matrix) != 5 or len(self.distortion) != 4:
-            raise SettingError("Fisheye: give fx, fy, cx, cy and the skew of K, and four numbers of D")
+            raise SettingError(f"{type(self).__name__}: give fx, fy, cx, cy and the skew of K, and four numbers of D")
+
+
+@settings
+class Fisheye(Calibrated):
+    """A fisheye lens as OpenCV calibrates it (`cv2.fisheye`), with k1 to k4."""
 
     def pixels(self, azimuth: Float[np.ndarray, " width"], elevation: Float[np.ndarray, " height"]) -> Pixels:
         """Where each direction is in the picture; nan beyond the angle up to which the calibration is one to one."""
@@ -155,28 +151,16 @@ class Fisheye:
 
 
 @settings
-class Omnidirectional:
-    """A catadioptric or very wide lens as OpenCV calibrates it (`cv2.omnidir`, the model of Mei and Rives 2007).
+class Omnidirectional(Calibrated):
+    """A catadioptric or very wide lens as OpenCV calibrates it (`cv2.omnidir`, the model of Mei and Rives 2007), with k1, k2, p1 and p2.
+
+    A camera under a mirror looks down, at itself, and its picture is a mirror image.
 
     Attributes:
         xi: Distance of the projection's centre from that of the unit sphere.
-        matrix: fx, fy, cx, cy and the skew (pixels), of K.
-        distortion: k1, k2, p1 and p2, of D.
-        looking: What the middle of the picture shows: up, down or ahead. A camera under a mirror sees itself: down.
-        offset: As of `Fisheye`.
-        mirrored: The picture is a mirror image, as a mirror makes it.
     """
 
     xi: float = number(low=0, high=1e3)
-    matrix: tuple[float, ...] = numbers((1.0, 1.0, 0.0, 0.0, 0.0), low=-MAX_PIXEL, high=MAX_PIXEL, unit="pixels")
-    distortion: tuple[float, ...] = numbers((0.0, 0.0, 0.0, 0.0), low=-1e6, high=1e6)
-    looking: str = choice("up", LOOKING)
-    offset: float = number(0.0, low=-100, high=100, unit="rad")
-    mirrored: bool = switch(False)
-
-    def __attrs_post_init__(self):
-        if len(self.matrix) != 5 or len(self.distortion) != 4:
-            raise SettingError("Omnidirectional: give fx, fy, cx, cy and the skew of K, and four numbers of D")
 
     def pixels(self, azimuth: Float[np.ndarray, " width"], elevation: Float[np.ndarray, " height"]) -> Pixels:
         """Where each direction is in the picture; nan where the model is not one to one."""
@@ -195,7 +179,7 @@ class Omnidirectional:
 
 
 def _camera_directions(
-    lens: Fisheye | Omnidirectional, azimuth: np.ndarray, elevation: np.ndarray
+    lens: Calibrated, azimuth: np.ndarray, elevation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions as unit vectors in the frame of a camera: x to the right of its picture, y down, z out of the lens."""
     turned = azimuth + (lens.offset if (lens.looking == "up") != lens.mirrored else -lens.offset)

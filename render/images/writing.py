@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import time
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wh
 from ..eye import Eye
 from ..poses import Poses
 from ..renderer import Renderer
-from .completing import complete, missing_rows, start_or_resume
+from .completing import complete, metadata_of, missing_rows, start_or_resume
 from .database import Database, read_database
 from .entries import FILENAME, HEADING, Columns, X, Y, Z, format_decimal, stored_poses, to_file_units
 
@@ -144,19 +143,16 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
     scene = triangles.tobytes() + rgb.tobytes() + bytes([*world.sky_rgb, world.double_sided])
     scene += world.texturing.to_bytes() if world.texturing else b""
     tussock = {
-        "version": 1,
         "world": hashlib.sha256(scene).hexdigest(),
         "poses": hashlib.sha256(poses.tobytes()).hexdigest(),
         "views": len(poses),
         "eye": _plain(eye),
     }
-    kind = "route" if grid is None else "grid"
-    metadata: dict[str, Any] = {"time": time.strftime("%Y-%m-%d %H:%M:%S"), "type": kind}
-    if grid is not None:
-        begin, spacing = [round(1e3 * m, 6) for m in (*grid.begin, eye.z)], round(1e3 * grid.spacing, 6)
-        metadata["grid"] = {"beginAtMM": begin, "separationMM": [spacing, spacing, 0.0], "size": [*grid.size, 1]}
-    camera = {"name": "tussock", "resolution": [eye.width, eye.height], "isPanoramic": 0}
-    return metadata | {"camera": camera, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": tussock}
+    if grid is None:
+        return metadata_of("route", "tussock", eye, tussock)
+    begin, spacing = [round(1e3 * m, 6) for m in (*grid.begin, eye.z)], round(1e3 * grid.spacing, 6)
+    lattice = {"beginAtMM": begin, "separationMM": [spacing, spacing, 0.0], "size": [*grid.size, 1]}
+    return metadata_of("grid", "tussock", eye, tussock, lattice)
 
 
 def _plain(eye: Eye) -> dict[str, Any]:

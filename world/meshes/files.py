@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError, InputError, first_line
-from ..file_kinds import MAKE_A_MESH, head_of
+from ..file_kinds import MAKE_A_MESH, head_of, kind_of
 from ..geometry import Bounds
 from ..origin import origin_of, shown
 from ..scene import World
@@ -95,11 +95,9 @@ def _stands_with_z_up(path: Path, meshes: list, reading: MeshReading) -> bool:
 
 def _kind(path: Path, known: set[str]) -> str:
     """What trimesh calls the format of a file. Raises FileError for an unknown one."""
-    head = head_of(path)
-    if head.startswith(b"glTF"):
-        return "glb"
-    if head.startswith((b"ply\n", b"ply\r\n")):
-        return "ply"
+    content = kind_of(head_of(path))
+    if content is not None and content.name in ("GLB", "PLY"):
+        return content.name.lower()
     kind = path.suffix.lower().lstrip(".")
     if kind not in known or kind in ARCHIVES:
         raise FileError(f"unknown kind of world {path.suffix!r}; give .glb, .gltf, .ply, .obj, .stl or AntWorld .bin")
