@@ -11,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tussock.world.contents import described
 from tussock.world.errors import FileError, SettingError, first_line
 
 if TYPE_CHECKING:  # the command line reads the defaults of an eye: without numpy, its help appears at once
@@ -109,9 +110,9 @@ def read_mask(path: Path) -> "Bool[np.ndarray, 'height width']":
     except FileError:
         raise
     except Exception as error:  # Pillow raises whatever its parsers raise
-        raise FileError(
-            f"{str(path)!r} cannot be read as a picture of a mask ({first_line(error)}); save it as PNG"
-        ) from error
+        with open(path, "rb") as file:
+            reason = described(file.read(4096)) or f"{first_line(error)}; save it as PNG"
+        raise FileError(f"{str(path)!r} cannot be read as a picture of a mask: {reason}") from error
     return np.asarray((pixels >= MIN_BRIGHT).all(axis=2))
 
 
