@@ -15,7 +15,6 @@ from tussock.render.images.writing import Grid, write_database
 from tussock.world.errors import InputError
 from tussock.world.files import read_world, write_world
 from tussock.world.geometry import Bounds
-from tussock.world.meshes.reading import MeshReading
 from tussock.world.scene import World
 from tussock.world.textures import to_display, to_linear
 
@@ -77,8 +76,7 @@ def test_a_material_without_a_colour_is_white():
 
 
 def test_a_leaf_is_a_leaf_and_not_its_card():
-    world = read_world(CASES / "09_alpha_cutout_leaf" / "leaf.glb", MeshReading(up="z"))  # it was saved with z up
-    picture = view(world, Eye(width=360, height=75, z=0.3))
+    picture = view(read_world(CASES / "09_alpha_cutout_leaf" / "leaf.glb"), Eye(width=360, height=75, z=0.3))
     seen = np.unique(picture[:, 120:240].reshape(-1, 4), axis=0).tolist()
     assert seen == [[0, 160, 0, 255], [191, 191, 191, 0]]
     card = (
@@ -334,6 +332,14 @@ def test_colours_of_stl(tmp_path, program):
     (tmp_path / "a.stl").write_bytes(data)
     own = (9, 8, 7) if program == "Magics" else (255, 255, 255)
     assert read_world(tmp_path / "a.stl").rgb.tolist() == [[255, 0, 0], [0, 255, 0], [*own]]
+
+
+def test_faces_without_texture_coordinates_leave_the_others_their_texture(read):
+    obj = "mtllib m.mtl\nusemtl a\nv -1 1 0\nv 1 1 0\nv 1 1 1\nv -1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 1 0\n"
+    obj += "f 1/1/1 2/2/1 3/3/1\nf 1//1 3//1 4//1\nv 0 -1 0\nv 1 -1 0\nv 0 -1 1\nvt 0.5 0.5\nf 5 6 7\nf 5/4 6/4 7/4\n"
+    image = png(np.full((2, 2, 4), (200, 30, 30, 255), np.uint8))
+    world = read(obj, "obj", m_mtl="newmtl a\nKd 1 1 1\nmap_Kd t.png\n", t_png=image)
+    assert world.rgb.tolist() == [[200, 30, 30]] * 4
 
 
 # Written and read again.
