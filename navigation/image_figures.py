@@ -32,7 +32,7 @@ def difference_figure(rotations: Sequence[Rotational], translations: Mapping[str
         xlim=(-180, 180), xticks=range(-180, 181, 90), xlabel="degrees left of the reference", ylabel="image difference"
     )
     for (name, each), colour in zip(translations.items(), (ROUTE_COLOUR, PATH_COLOUR), strict=False):
-        right.plot(each.distances, each.curve, "o-", color=colour, ms=3, lw=1.3, label=f"{name} of the reference")
+        right.plot(each.distances, each.curve, "o-", color=colour, ms=3, lw=1.3, label=name)
     right.set(xlabel="m from the reference, at its heading")
     left.set_ylim(bottom=0)
     for each in (left, right):

@@ -92,6 +92,8 @@ def read_mask(path: Path) -> "Bool[np.ndarray, 'height width']":
     import numpy as np
     from PIL import Image
 
+    from tussock.world.file_kinds import head_of, kind_of
+
     if not os.path.isfile(path):  # unlike Path.is_file, False for names that are too long
         raise FileError(
             f"there is no mask {str(path)!r}; give a picture that is white where the eye sees, black where it does not"
@@ -109,9 +111,11 @@ def read_mask(path: Path) -> "Bool[np.ndarray, 'height width']":
     except FileError:
         raise
     except Exception as error:  # Pillow raises whatever its parsers raise
-        raise FileError(
-            f"{str(path)!r} cannot be read as a picture of a mask ({first_line(error)}); save it as PNG"
-        ) from error
+        kind = kind_of(head_of(path))
+        reason = f"{first_line(error)}; save it as PNG"
+        if kind is not None and kind.group != "image":
+            reason = f"it is {kind.name}; {kind.remedy if kind.group == 'pointer' else 'give a picture'}"
+        raise FileError(f"{str(path)!r} cannot be read as a picture of a mask: {reason}") from error
     return np.asarray((pixels >= MIN_BRIGHT).all(axis=2))
 
 

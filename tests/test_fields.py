@@ -488,6 +488,7 @@ def test_a_pixel_of_a_smaller_eye_sees_where_all_of_the_picture_does(tmp_path):
 
 def test_masks_that_cannot_be_used_are_refused(tmp_path):
     (tmp_path / "text.png").write_text("white")
+    (tmp_path / "pointer.png").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     for given, message in (
         (np.zeros((30, 120), bool), "nothing is visible"),
         (np.ones((30, 121), bool), "shape"),
@@ -499,6 +500,10 @@ def test_masks_that_cannot_be_used_are_refused(tmp_path):
     ):
         with pytest.raises(SettingError, match=message):
             Eye(width=120, height=30, mask=given)
-    for path, message in ((tmp_path / "none.png", "there is no mask"), (tmp_path / "text.png", "cannot be read")):
+    for path, message in (
+        (tmp_path / "none.png", "there is no mask"),
+        (tmp_path / "text.png", "cannot be read"),
+        (tmp_path / "pointer.png", "git lfs pull"),
+    ):
         with pytest.raises(FileError, match=message):
             Eye(width=120, height=30, mask=path)

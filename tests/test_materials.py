@@ -330,8 +330,16 @@ def test_colours_of_stl(tmp_path, program):
     for colour in (red, green, none):
         data += struct.pack("<12fH", 0, 0, 1, -1, 1, 0, 1, 1, 0, 1, 1, 1, colour)
     (tmp_path / "a.stl").write_bytes(data)
-    own = (9, 8, 7) if program == "Magics" else (102, 102, 102)
+    own = (9, 8, 7) if program == "Magics" else (255, 255, 255)
     assert read_world(tmp_path / "a.stl").rgb.tolist() == [[255, 0, 0], [0, 255, 0], [*own]]
+
+
+def test_faces_without_texture_coordinates_leave_the_others_their_texture(read):
+    obj = "mtllib m.mtl\nusemtl a\nv -1 1 0\nv 1 1 0\nv 1 1 1\nv -1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 1 0\n"
+    obj += "f 1/1/1 2/2/1 3/3/1\nf 1//1 3//1 4//1\nv 0 -1 0\nv 1 -1 0\nv 0 -1 1\nvt 0.5 0.5\nf 5 6 7\nf 5/4 6/4 7/4\n"
+    image = png(np.full((2, 2, 4), (200, 30, 30, 255), np.uint8))
+    world = read(obj, "obj", m_mtl="newmtl a\nKd 1 1 1\nmap_Kd t.png\n", t_png=image)
+    assert world.rgb.tolist() == [[200, 30, 30]] * 4
 
 
 # Written and read again.

@@ -164,6 +164,12 @@ def test_the_axis_that_is_up_can_be_given(tmp_path, suffix, up):
     assert same_shape(read_world(tmp_path / f"posts{suffix}", MeshReading(up=up)), vertices, faces)
 
 
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb"])
+def test_what_has_no_colour_is_white_in_every_format(tmp_path, suffix):
+    trimesh.Trimesh(*posts(), process=False).export(tmp_path / f"posts{suffix}")
+    assert (read_world(tmp_path / f"posts{suffix}").rgb == 255).all()
+
+
 @pytest.mark.parametrize("reading", [{"unit": unit} for unit in UNITS] + [{"scale": 0.5}])
 def test_the_unit_can_be_given(tmp_path, reading):
     vertices, faces = posts()

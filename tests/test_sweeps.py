@@ -21,6 +21,7 @@ import psutil
 import pytest
 from browser import WIDTHS, in_browser
 from commands import TUSSOCK, printed, process_json, tussock
+from PIL import Image
 
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import key_of
@@ -220,6 +221,12 @@ def test_files_that_a_sweep_names_are_found_from_everywhere(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     (run,) = read_sweep(Path("sweep.toml")).experiments
     assert run.route == tmp_path / "route.csv"
+    Image.fromarray(np.pad(np.zeros((10, 20), np.uint8), 20, constant_values=255)).save(tmp_path / "mask.png")
+    path = written(tmp_path, "[fixed]\nmask = 'mask.png'\n[axes]\nseed = [1]\n")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    (run,) = read_sweep(path).experiments
+    assert run.eye.masked
 
 
 def test_a_file_that_is_named_like_a_choice_changes_no_run(tmp_path, monkeypatch):

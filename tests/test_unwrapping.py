@@ -343,7 +343,9 @@ def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     save(tmp_path / "p.png", wrapped(panorama(), RING))
     save(tmp_path / "grey.png", np.full((50, 50, 3), 90, np.uint8))
+    (tmp_path / "v.mp4").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     for arguments, message in (
+        (["v.mp4", "--out", "o"], "git lfs pull"),
         (["p.png", "--out", "o.gif"], r"\.png or \.jpg"),
         (["p.png", "--out", "o.png", "--lens", "mirror"], "lens is 'mirror'"),
         (["p.png", "--out", "o.png", "--lens", "fisheye"], "needs a calibration"),
@@ -356,7 +358,7 @@ def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkey
         code, out, err = run(capfd, *arguments)
         assert (code, out) == (2, ""), arguments
         assert re.search(message, err.splitlines()[-1]), err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.png", "p.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.png", "p.png", "v.mp4"]
 
 
 def test_invalid_rings_are_refused():

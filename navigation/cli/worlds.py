@@ -71,7 +71,8 @@ class ViewCommand(ViewOptions):
             backend = renderer.backend
         message(f"renderer: {backend}")
         if surroundings.eye.masked:
-            message(f"black: what the eye does not see, {1 - surroundings.eye.visible().mean():.0%} of the panorama")
+            hidden, shown_as = 1 - surroundings.eye.visible().mean(), "transparent" if self.alpha else "black"
+            message(f"{shown_as}: what the eye does not see, {hidden:.0%} of the panorama")
             view = surroundings.eye.hide(view[None])[0]
         image = cv2.cvtColor(view, cv2.COLOR_RGBA2BGRA)
         with replacing(self.out) as partial:

@@ -173,6 +173,8 @@ class _Reader:
             return str((self.path.parent / value).resolve())
         if name == "model" and value.endswith(MODEL_SUFFIX):
             return str((self.path.parent / value).resolve())
+        if name == "mask" and ":" not in value:  # otherwise its pixels
+            return str((self.path.parent / value).resolve())
         if Path in kinds:
             return (self.path.parent / value).resolve()
         return float(value) if float in kinds else value

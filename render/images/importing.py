@@ -131,7 +131,7 @@ def _metadata_of(source: Path) -> dict[str, Any]:
     return read_metadata(source / METADATA) if is_database else {}
 
 
-def _rows(path: Path, kind: str, settings: Import) -> Track:
+def _rows(path: Path, kind: str, settings: ImportSettings) -> Track:
     """Where the pictures of a route or a grid were taken. Raises FileError, SettingError."""
     if not os.path.isfile(path):
         raise FileError(f"there is no table {path} of where the pictures were taken; give one with --track")

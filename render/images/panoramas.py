@@ -9,7 +9,7 @@ from tussock.world.progress import Progress, no_progress
 
 from .camera import Camera
 from .database import check_new, make_folder
-from .pictures import SUFFIXES, Picture, encoded
+from .pictures import SUFFIXES, Picture, check_content, encoded
 from .ring_search import draw_ring
 from .sources import frames_of, is_video_file, picture_names, read_panoramas, sample
 from .unwrapping import Ring, Unwrapping
@@ -49,6 +49,7 @@ def unwrap_files(
         raise SettingError(f"every {every} pictures; give at least 1")
     single = os.path.isfile(source) and not is_video_file(source)
     if single:
+        check_content(source)
         folder, references = source.parent, [source.name]
     elif is_video_file(source):
         folder, references = source, frames_of(source, every)

@@ -8,7 +8,7 @@ from pathlib import Path, PureWindowsPath
 
 from tussock.world.errors import FileError, SettingError
 
-from .pictures import SUFFIXES, Picture, read_image
+from .pictures import SUFFIXES, Picture, check_content, read_image
 from .video import count_frames, frames, is_video
 
 SAMPLE = 12  # pictures in which a ring is looked for
@@ -19,6 +19,11 @@ Reference = str | int  # name of a picture, or number of a frame
 
 def picture_names(folder: Path) -> list[str]:
     """Names of the pictures in a folder, by the numbers in them: image2 comes before image10. Raises FileError if there are none."""
+    if folder.is_file():
+        check_content(folder)
+        raise FileError(
+            f"{folder} is neither a folder of pictures nor a video (AVI, MP4, MOV or MKV); give one of these"
+        )
     if not folder.is_dir():
         raise FileError(f"there is no folder {folder}; give pictures, a folder of pictures, or a video")
     names = [

@@ -215,7 +215,7 @@ def _lengths(
     except InputError as error:
         raise FileError(f"{path}: {error}") from error
     factor = column.factor if column.stated else LENGTHS[unit or "m"][0]
-    if not column.stated and unit is None and axis != "z":
+    if not column.stated and unit is None and axis == "x":  # y, too, and said once
         log.warning("%s: %r has no unit and is taken as metres; --unit mm, cm, in or ft takes another", path, name)
     return factor * _numbers(path, lines, texts[axis], f"{name!r}")
 

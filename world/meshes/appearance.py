@@ -7,7 +7,7 @@ The rules:
   programs that write them in 8 bits (trimesh, MeshLab, CloudCompare, Open3D) write display colours. In 16 bits or floats, as
   Blender writes them, they are linear.
 - OBJ: map_Kd times Kd, in display colours. Colours of vertices are drawn in place of Kd; where there is a texture, it is drawn alone.
-- PLY, STL and others: the colours of vertices or triangles in display colours; grey without any.
+- PLY, STL and others: the colours of vertices or triangles in display colours; white without any.
 """
 
 import logging
@@ -124,6 +124,8 @@ def _covering(mesh: Any, path: Path, get: Callable[[str], bytes] | None) -> _Cov
         if visual.kind == "vertex":
             return _Covering(Material(), np.asarray(visual.vertex_colors)[faces])
         colours = stl_colours(mesh.face_attributes["stl"], path) if "stl" in mesh.face_attributes else None
+        if colours is None and not visual.defined:  # trimesh would show grey; glTF, by its standard, white
+            return _Covering(Material(), white)
         colours = np.asarray(visual.face_colors) if colours is None else colours
         return _Covering(Material(), np.repeat(colours[:, None], 3, axis=1))
     carried = carried_material(visual.material.name)

@@ -33,6 +33,8 @@ def prepared_obj(path: Path, search: Neighbours) -> bytes:
         text = re.sub(r"\n((?:v|vt|vn|f) [^#\n]*)#[^\n]*", r"\n\1", text)
     if re.search(r"\nf[^\n]*-", text):
         text = "\n".join(_with_absolute_indices(text.split("\n")))
+    if re.search(r"\nf +\d+/\d", text) and re.search(r"\nf +\d+(?://\d+)? ", text):
+        text = _with_texture_coordinates(text)
     if re.search(r"\nf(?: +\S+){5}", text):
         text = _without_polygons(text)
     libraries = [name.strip() for name in re.findall(r"\nmtllib +([^\n]*)", text)]
@@ -68,6 +70,14 @@ def _with_absolute_indices(lines: list[str]) -> Iterator[str]:
                 for corner in corners
             )
         yield line
+
+
+def _with_texture_coordinates(text: str) -> str:
+    """The text, with the place 0 0 in the texture for faces that have none: trimesh drops the texture of all faces otherwise."""
+    number = len(re.findall(r"\nvt ", text)) + 1
+    faces = re.compile(r"\nf(?: +\d+(?://\d+)?)+ *(?=\n)")
+    text = faces.sub(lambda face: re.sub(r" (\d+)(?:/(/\d+))?", rf" \1/{number}\2", face[0]), text)
+    return f"{text}vt 0 0\n"
 
 
 def _without_polygons(text: str) -> str:

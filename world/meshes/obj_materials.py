@@ -56,7 +56,7 @@ def _colour(simple: Any, image: Any) -> np.ndarray:
     """What the texture, or white, is multiplied by (0..1)."""
     keys = simple.kwargs
     if image is None:
-        return np.broadcast_to(keys.get("kd", np.asarray(simple.diffuse[:3]) / 255), 3)
+        return np.broadcast_to(keys.get("kd", 1.0), 3)
     kd = np.broadcast_to(keys.get("kd", 1.0), 3)
     # Black, and the colours of trimesh's default material, are written by programs that do not multiply by them.
     never_meant = not kd.any() or all(np.allclose(keys.get(key, 0), 0.4) for key in ("kd", "ka", "ks"))

@@ -25,5 +25,4 @@ def stl_colours(attributes: UInt16[np.ndarray, " n"], path: Path) -> UInt8[np.nd
     own = values >> 15 == (0 if found else 1)
     if found and len(after) >= 4:
         return np.where(own[:, None], np.column_stack([low, middle, high, full]), np.frombuffer(after[:4], np.uint8))
-    grey = np.array([102, 102, 102, 255], np.uint8)  # as trimesh shows triangles without a colour
-    return np.where(own[:, None], np.column_stack([high, middle, low, full]), grey) if own.any() else None
+    return np.where(own[:, None], np.column_stack([high, middle, low, full]), np.uint8(255)) if own.any() else None
