@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scenes import views
 from sklearn.metrics import average_precision_score
 
-from tussock.navigation.catchment import Landscape, catchment, landscape, positions_around
 from tussock.navigation.encoding import Encoding
-from tussock.navigation.image_difference import (
+from tussock.navigation.measures.catchment import Landscape, catchment, landscape, positions_around
+from tussock.navigation.measures.image_difference import (
     differences,
     displaced,
     rotational,
@@ -20,8 +20,8 @@ from tussock.navigation.image_difference import (
     valley,
     valley_of_rotations,
 )
+from tussock.navigation.measures.place_recognition import recognise
 from tussock.navigation.models import PerfectMemory
-from tussock.navigation.place_recognition import recognise
 from tussock.render.eye import Eye
 from tussock.render.images import Grid, write_database
 from tussock.render.renderer import open_renderer

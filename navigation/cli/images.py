@@ -39,8 +39,8 @@ class RidfCommand(SourceOptions):
     def run(self) -> dict[str, Any]:
         import numpy as np
 
-        from ..image_difference import rotational, spread, translational
-        from ..image_figures import difference_figure
+        from ..measures.figures import difference_figure
+        from ..measures.image_difference import rotational, spread, translational
 
         check_figure(self.out)
         sides = distances(self.displacements_m, "--displacements-m")
@@ -100,8 +100,8 @@ class CatchmentCommand(ModelOptions):
     """Figure to write (.png or .svg)."""
 
     def run(self) -> dict[str, Any]:
-        from ..catchment import catchment, landscape, positions_around
-        from ..image_figures import catchment_figure
+        from ..measures.catchment import catchment, landscape, positions_around
+        from ..measures.figures import catchment_figure
         from ..tested_poses import route_views_of
 
         check_figure(self.out)
@@ -197,9 +197,9 @@ class PlaceCommand(LearningOptions):
     def run(self) -> dict[str, Any]:
         import numpy as np
 
-        from ..image_difference import differences_of_places
-        from ..image_figures import place_figure
-        from ..place_recognition import recognise
+        from ..measures.figures import place_figure
+        from ..measures.image_difference import differences_of_places
+        from ..measures.place_recognition import recognise
         from ..tested_poses import poses_to_test
 
         check_figure(self.out)
@@ -233,7 +233,7 @@ def seen_at(text: str | None, renderer: Any) -> "Pose":
 
     from tussock.world.geometry import Pose
 
-    from ..image_difference import viewpoints
+    from ..measures.image_difference import viewpoints
 
     x, y, heading_deg = numbers(text or "", "--at", "X,Y,HEADING_DEG", "5,5,90")
     if not (all(map(math.isfinite, (x, y, heading_deg))) and renderer.world.field.contains(x, y)):

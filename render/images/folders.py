@@ -70,7 +70,9 @@ def eye_of(route: Path | None, grid: Path | None = None, given: Mapping[str, Any
     known: dict[str, Any] = {}
     for folder, fields in found.items():
         for name, value in fields.items():
-            if known.setdefault(name, value) != value:
+            if (
+                known.setdefault(name, value) != value and name != "z"
+            ):  # a height that many only assume changes no image
                 raise FileError(
                     f"{folders[0]} and {folder} were seen by different eyes: {name} {_shown(name, known[name])} and "
                     f"{_shown(name, value)}; give two of one eye"
@@ -170,11 +172,16 @@ def route_of(folder: Path, headings: str = "auto") -> Route:
     database = open_database(folder, headings)
     if database.kind != "route":
         raise FileError(f"{folder} is a database of a {database.kind}; give one of a route")
-    diagnosis = diagnose(database.poses, "bearing")
+    if headings in ("as-is", "path"):
+        return Route(database.poses)
+    diagnosis = diagnose(database.poses, "bearing" if headings == "auto" else headings)
     if headings == "auto" and diagnosis.kind == "convention":
         raise FileError(f"{folder}: {diagnosis}; {diagnosis.flags}")
-    if headings == "auto" and str(diagnosis):
-        log.warning(f"{folder}: {diagnosis}; they are taken as they are, as headings that each view faces")
+    if str(diagnosis):
+        taken = "they are taken as they are, as headings that each view faces"
+        log.warning(
+            f"{folder}: {diagnosis}; {taken}" if headings == "auto" else f"{folder}: as --headings says, {diagnosis}"
+        )
     return Route(database.poses)
 
 

@@ -23,10 +23,10 @@ from tussock.world.errors import SettingError
 from tussock.world.geometry import Route, columns_of_turn
 from tussock.world.progress import Progress, no_progress
 
-from .encoding import Encoding
-from .evaluation import encoded_views
-from .scan import best_turn
-from .training import training_source, training_views
+from ..encoding import Encoding
+from ..evaluation import encoded_views
+from ..scan import best_turn
+from ..training import training_source, training_views
 
 BATCH = 64  # views compared at once
 SIDES = {

@@ -24,10 +24,10 @@ from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Pose, Route, columns_of_turn, wrap_angle
 from tussock.world.progress import Progress, no_progress
 
-from .encoding import Encoding
-from .evaluation import MAX_POSITIONS, encoded_views, facing_east
-from .models.base import FamiliarityModel
-from .scan import best_turn
+from ..encoding import Encoding
+from ..evaluation import MAX_POSITIONS, encoded_views, facing_east
+from ..models.base import FamiliarityModel
+from ..scan import best_turn
 
 NEIGHBOURS = 1.01 * np.sqrt(2)  # spacings: the eight neighbours in a lattice, and no others
 

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from tussock.world.geometry import Pose, Route, turn_of_columns
 from tussock.world.scene import World
 
+from ..reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, canvas
+from ..reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from .catchment import Catchment, Landscape
 from .image_difference import Rotational, Translational
 from .place_recognition import PlaceRecognition
-from .reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, canvas
-from .reports.maps import draw_arrows, draw_map, draw_route, map_axes
 
 SHADES = "#0b3c8c", "#2f6bff", "#2b8a6f", "#d98c1f", "#e6352b", "#7b4fb5", CURVE_COLOUR  # of displacements
 MAX_ARROWS = 600  # on a map
