@@ -76,7 +76,8 @@ def read_mesh(path: Path, reading: MeshReading) -> World:
     if reading.up != "auto":
         up = reading.up
     elif file.kind in GLTF and is_y_up(file.own):
-        up = "y" if file.own is not None or not _stands_with_z_up(path, meshes, reading) else "z"
+        turned = file.own is None and _readable(path, lambda: _stands_with_z_up(path, meshes, reading))
+        up = "z" if turned else "y"
     return _readable(path, lambda: _world(path, file, meshes, reading, up))
 
 
