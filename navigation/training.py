@@ -100,7 +100,7 @@ def training_poses_in(
 @cache  # once, however many models learn
 def _remark_on_learning_walk() -> None:
     log.warning(
-        "there are no views beside the route, so those on the route are learned and no learning walk; give --grid-database for one"
+        "there are no views next to the route, so only those on it are learned, without a learning walk; give --grid-database for one"
     )
 
 

@@ -1,4 +1,4 @@
-"""Headings are diagnosed as the convention that they were written in, or as undetermined; noise accuses nobody."""
+"""Headings are diagnosed as the convention that they were written in, or as undetermined; noise alone is never another one."""
 
 import re
 

@@ -241,7 +241,7 @@ def test_a_walk_over_the_grid_arrives_and_tells_how_far_its_views_were(capfd, ar
     distances = [float(row["view_distance_m"]) for row in rows]
     assert result["max_view_distance_m"] == max(distances)
     assert 0 < max(distances) <= 0.1 * np.sqrt(2) / 2 + 1e-6
-    assert all(row["covered"] == "" for row in rows)  # nobody knows
+    assert all(row["covered"] == "" for row in rows)  # not known
     settings = json.loads((tmp_path / "run" / "summary.json").read_text())["settings"]
     assert settings["world"] is None
     assert settings["grid_database"] == str(arguments[3])

@@ -63,7 +63,7 @@ PROGRAMS = {
 }  # fmt: skip
 CLOUDS = (".e57", ".las", ".laz", ".xyz", ".pcd", ".pts", ".ptx", ".asc")
 MAKE_A_MESH = "make a mesh of it, for example by Poisson reconstruction in MeshLab or CloudCompare"
-# Kinds that are no world, with what to do; {} is the name of the kind.
+# Kinds that are not worlds, with what to do; {} is the name of the kind.
 REFUSED = {
     "archive": "a compressed archive; unpack it and give the mesh that is in it",
     "page": "a web page, not a mesh (was a link saved in its place?); download the file itself",
@@ -74,7 +74,7 @@ REFUSED = {
 
 
 def kind_of(data: bytes) -> Kind | None:
-    """What a file is that is no table of numbers; None where it is not known to be something else.
+    """What a file is, by its content; None where it may be a table of numbers.
 
     Args:
         data: The whole file, or its beginning.

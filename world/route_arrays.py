@@ -9,7 +9,7 @@ import zlib
 
 import numpy as np
 
-from .errors import FileError
+from .errors import FileError, first_line
 
 MAX_UNPACKED = 2**28  # bytes of a compressed variable
 MAX_NESTED = 20  # structs in structs
@@ -36,9 +36,7 @@ def read_mat(data: bytes) -> dict[str, np.ndarray]:
                 io.BytesIO(data), squeeze_me=True, struct_as_record=False, verify_compressed_data_integrity=False
             )
     except Exception as error:  # scipy raises whatever its parser raises
-        raise FileError(
-            f"it cannot be read as a MAT-file ({str(error).splitlines()[0] if str(error) else error!r})"
-        ) from error
+        raise FileError(f"it cannot be read as a MAT-file ({first_line(error)})") from error
     return _flat({name: value for name, value in variables.items() if not name.startswith("__")})
 
 
@@ -123,9 +121,7 @@ def read_npy(data: bytes) -> dict[str, np.ndarray]:
             raise ValueError("it has objects, or another size than it claims")
         array = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if fortran else "C")
     except Exception as error:  # numpy evaluates the header as Python, which raises anything
-        raise FileError(
-            f"it cannot be read as .npy ({str(error).splitlines()[0] if str(error) else error!r})"
-        ) from error
+        raise FileError(f"it cannot be read as .npy ({first_line(error)})") from error
     if dtype.names:
         return {name: array[name].astype(np.float64) for name in dtype.names if array[name].dtype.kind in "iuf"}
     return {"array": array.astype(np.float64)} if dtype.kind in "iuf" and array.size > 1 else {}
@@ -151,7 +147,5 @@ def read_npz(data: bytes) -> dict[str, np.ndarray]:
     except FileError:
         raise
     except Exception as error:  # zipfile raises errors of zlib, struct and others
-        raise FileError(
-            f"it cannot be read as .npz ({str(error).splitlines()[0] if str(error) else error!r})"
-        ) from error
+        raise FileError(f"it cannot be read as .npz ({first_line(error)})") from error
     return arrays

@@ -1,7 +1,7 @@
 """Routes that an insect could walk: smooth, with a few corners, clear of all obstacles.
 
 This works in any world: obstacles are what its triangles cover on the ground, whatever they belong to. Where agents stand on the
-world's mesh (`World.on_mesh`), the ground is no obstacle, heights are those above it, and a route keeps off what is too steep and
+world's mesh (`World.on_mesh`), the ground is not an obstacle, heights are those above it, and a route keeps off what is too steep and
 off its edge. Lengths are measured over the x-y plane.
 """
 

@@ -1,7 +1,7 @@
 """Pictures on the triangles of a world: textures, and colours that change across a triangle.
 
 All colours are display colours (sRGB), as everywhere in tussock. Materials are folded into the texels when a file is read
-(meshes/appearance.py), so whoever draws needs only this:
+(meshes/appearance.py), so a renderer needs only this:
 
 - Texture coordinates and corner colours are linear across a triangle, in space (perspective-correct in a view).
 - The texel at (u, v) is the one that contains it ("nearest"), or the four around it, weighed by distance ("linear"). u goes right

@@ -253,7 +253,7 @@ def distances(text: str, flag: str) -> list[float]:
 
 
 def check_distance(value: float, flag: str) -> None:
-    """Refuse what is no distance over 0. Raises SettingError."""
+    """Refuse a distance that is not over 0. Raises SettingError."""
     if not (math.isfinite(value) and value > 0):
         raise SettingError(f"{flag} {value:g}: give a distance over 0")
 

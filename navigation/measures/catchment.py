@@ -7,7 +7,7 @@
   the difference falls most steeply lead home. Home are the positions within half the diagonal of a cell of the reference, or of the
   route; at least the nearest one. Its *area* is the number of these positions times the area of a cell. Its *volume* is the space between
   the landscape and the level of its rim: the sum over them of (greatest difference in the catchment - difference) times the area of a cell.
-  Positions have one height, so it is no volume in space, as Murray and Zeil (2017) measure it.
+  Positions have one height, so it is not a volume in space, as Murray and Zeil (2017) measure it.
 - *Catchment by heading*: the positions at which the model's best heading is within 45 (or 90) degrees of the right one, which is that
   of the nearest reference view.
 """

@@ -213,7 +213,7 @@ def _frames_of_rows(video: Path, numbers: tuple[int, ...]) -> tuple[int, ...]:
     """The frame of each row. Some recorders write the counter of a tracker into `Frame`; their rows are the frames in order."""
     try:
         count = claimed_frames(video)
-    except FileError:  # whoever reads the images is told
+    except FileError:  # reported when the images are read
         return numbers
     if len(numbers) != count or max(numbers) < count:
         return numbers

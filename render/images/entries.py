@@ -163,8 +163,12 @@ def to_file_units(poses: Poses) -> Float[np.ndarray, "n 3"]:
     poses = as_poses(poses)
     if (np.abs(poses[:, :2]) * 1e3 >= MAX_NUMBER).any():
         raise SettingError(f"a pose is too far away for a database; give x and y up to {MAX_NUMBER / 1e3:g} m")
-    bearing = np.rint((90 - np.degrees(poses[:, 2])) * 1e9) % FULL_TURN
-    return np.column_stack([np.rint(poses[:, :2] * 1e9), bearing])
+    return np.column_stack([np.rint(poses[:, :2] * 1e9), bearings_in_file(poses[:, 2])])
+
+
+def bearings_in_file(headings: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Bearings of headings (rad) in 1e-9 degrees, from 0 to under 360 degrees, all whole."""
+    return np.rint((90 - np.degrees(headings)) * 1e9) % FULL_TURN
 
 
 def from_file_units(values: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

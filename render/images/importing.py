@@ -21,7 +21,7 @@ from ..mask import MIN_BRIGHT, fitted, read_mask
 from .camera import Camera
 from .completing import complete, metadata_of, missing_rows, start_or_resume
 from .database import KINDS, Database, check_video_name, read_database
-from .entries import ENTRIES, FILENAME, HEADING, Columns, X, Y, Z, format_decimal
+from .entries import ENTRIES, FILENAME, HEADING, Columns, X, Y, Z, bearings_in_file, format_decimal
 from .lens_metadata import needs_unwrapping, stated_unwrapping, unwrapper_in
 from .metadata import METADATA, group_in, read_metadata
 from .pictures import Picture, encoded
@@ -186,7 +186,7 @@ def _columns(taken: Taken, kind: str, suffix: str) -> tuple[Columns, dict[str, A
     """The entries of the complete database; and the metadata of a grid, if its positions are a complete one."""
     n = len(taken.references)
     nanometres = np.rint(np.column_stack([taken.poses[:, :2], taken.z]) * 1e9)
-    bearing = np.rint((90 - np.degrees(taken.poses[:, 2])) * 1e9) % 360e9
+    bearing = bearings_in_file(taken.poses[:, 2])
     if not (np.isfinite(nanometres).all() and np.abs(nanometres).max() < 1e20):
         raise FileError("a position is too far away for a database; give x, y and z up to 1e+08 m")
     mm = np.rint(nanometres / 1e6).astype(int)

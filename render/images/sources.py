@@ -51,7 +51,7 @@ def name_in(folder: Path, text: str) -> str | None:
 
 
 def frames_of(video: Path, every: int) -> list[int]:
-    """Every so many frames of a video. Raises FileError, SettingError."""
+    """Every N-th frame of a video. Raises FileError, SettingError."""
     if every < 1:
         raise SettingError(f"every {every} frames; give at least 1")
     found = list(range(0, count_frames(video), every))

@@ -79,7 +79,7 @@ def read_track(
 
     Args:
         path: A table as text.
-        columns: None finds them by their names. "x=East,heading=Yaw" tells which columns hold what; "x,y,-,filename" names the columns
+        columns: None finds them by their names. "x=East,heading=Yaw" says which columns hold what; "x,y,-,filename" names the columns
             in their order, - for others.
         unit: Of positions whose columns do not state it: mm, cm, m, in or ft. None is metres.
         headings: A name in `tussock.world.heading_names.HEADINGS`.
