@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 
 COLUMNS = ("x_m", "y_m", "heading_deg")  # of a route as CSV
 MAX_BYTES = 2**29  # of a file, which is read whole
-LARGE = 1000.0  # m; a route that is larger, and whose unit is not stated, may be in another unit
+LARGE, SMALL = 100.0, 0.05  # m; a route that is larger or smaller, and whose unit is not stated, may be in another unit
 JITTERY = 0.3  # of a step; with more jitter, the direction from point to point is noise
 MANY_REPEATED = 0.05  # of the points
 
@@ -123,13 +123,15 @@ def _remark_positions(path: Path, points: Points, route: Route, smooth: float) -
     if count - kept > max(2, MANY_REPEATED * count):
         logger.warning("%s: %d of %d points repeat the one before and are left out", path, count - kept, count)
     extent = float(np.ptp(route.xy, axis=0).max())
-    if points.unstated and extent > LARGE:
+    if points.unstated and not SMALL < extent < LARGE:
         logger.warning(
-            "%s: %s have no unit; taken as metres, the route is %.4g m wide. If they are millimetres, give --columns 'x [mm],y [mm]', with "
-            "the other columns in their order",
+            "%s: %s have no unit; taken as metres, the route is %.4g m wide. If they are %s",
             path,
             points.unstated,
             extent,
+            "millimetres, give --columns 'x [mm],y [mm]', with the other columns in their order; pixels must be converted"
+            if extent > LARGE
+            else "degrees on the globe, convert them to metres (UTM)",
         )
     noise, step = jitter(route.xy), float(np.median(np.diff(route.arc)))
     if not smooth and noise > JITTERY * step:
