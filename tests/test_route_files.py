@@ -64,6 +64,22 @@ TABLES = {
     "UTF-16 without a mark": ("r.csv", table("x_m;y_m;heading_deg", X, Y, HEADING, separator=";").encode("utf-16-le")),
     "an old Mac": ("r.csv", table("x_m,y_m,heading_deg", X, Y, HEADING, end="\r")),
     "camel case and feet": ("r.csv", table("posX [ft],posY [ft],headingDeg", X / 0.3048, Y / 0.3048, HEADING)),
+    "a tracker's with a text before the names, and units below": ("r.txt", ('"Header lines";"4"\n"Trial";"1"\n\n'
+        '"Time";"X center";"Y center";"Direction"\n"s";"cm";"cm";"deg"\n'
+        + table(None, U, 1e2 * X, 1e2 * Y, HEADING, separator=";")).encode("utf-16")),
+    "TrackMate's three lines of names, and units": ("r.csv", "LABEL,TRACK_ID,POSITION_X,POSITION_Y,yaw\nLabel,Track ID,X,Y,Yaw\n"
+        + ",,(mm),(mm),(rad)\n" + table(None, ["ID1"] * 60, ["0"] * 60, 1e3 * X, 1e3 * Y, RADIANS)),
+    "TRex's": ("r.csv", table("frame,X#wcentroid (cm),Y#wcentroid (cm),heading", U, 1e2 * X, 1e2 * Y, HEADING)),
+    "ROS 1: names in a comment, text in the rows, a quaternion": ("r.csv", table(
+        "%time,field.header.frame_id,field.pose.pose.position.x,field.pose.pose.position.y,field.pose.pose.orientation.x,"
+        "field.pose.pose.orientation.y,field.pose.pose.orientation.z,field.pose.pose.orientation.w,field.twist.twist.linear.x",
+        U, ["odom"] * 60, X, Y, 0 * X, 0 * X, np.sin(RADIANS / 2), np.cos(RADIANS / 2), U)),
+    "TUM's": ("r.txt", table("# timestamp tx ty tz qx qy qz qw", U, X, Y, U, 0 * X, 0 * X, -np.sin(RADIANS / 2), -np.cos(RADIANS / 2),
+        separator=" ")),
+    "EuRoC's": ("r.csv", table("#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []",
+        U, X, Y, np.cos(RADIANS / 2), 0 * X, 0 * X, np.sin(RADIANS / 2))),
+    "numbers of rows, tracks of which there is one": ("r.csv", table("id,ant_id,x,y,heading",
+        [str(n) for n in range(60)], ["7"] * 60, X, Y, HEADING)),
     "spreadsheets": ("r.csv", table("x_m,y_m,heading_deg,,", X, Y, HEADING, [""] * 60, [""] * 60) + ",,,,\n,,,,\n"),
 }  # fmt: skip
 
@@ -82,6 +98,9 @@ def test_tables_are_understood(tmp_path, caplog, kind):
         (table(None, X, Y, U, RADIANS, separator=";").replace(".", ","), "x,y,-,theta_rad"),
         (table("x_m,X [mm],y_m,w", X, 7e3 * X, Y, HEADING), "x,-,y,heading"),
         (table("a;b;c", X, Y, HEADING, separator=";"), "x,y,heading"),
+        (table(None, [f"2019-03-04 10:11:{n:02d}" for n in range(60)], X, Y, HEADING), "-,x,y,heading"),
+        (table("ant,x,y,h", [str(n // 30) for n in range(60)], X, Y, HEADING), "-,x,y,heading"),
+        (table(None, U, X, Y, 0 * X, 0 * X, np.sin(RADIANS / 2), np.cos(RADIANS / 2)), "-,x,y,qx,qy,qz,qw"),
     ],
 )
 def test_columns_are_named_by_the_flag(tmp_path, content, columns):
@@ -104,6 +123,10 @@ REFUSED = {
     "degrees on the globe": (table("latitude,longitude", X, Y), "in degrees on the globe; convert them to metres"),
     "no names": (table(None, X, Y, HEADING), "line 1: the columns have no names; give them, as --columns x,y,heading"),
     "many gaps": ("x,y\n" + "0,0\n1,1\n,\n2,2\nNaN,nan\n3,3\n", "line 4: x is ''; .* \\(2 of 6 rows lack a number"),
+    "several tracks": (table("frame,ant_id,x,y", U, ["4", "7"] * 30, X, Y), "holds 2 tracks by its column 'ant_id' \\(4, 7\\)"),
+    "pixels in a line of units": ("POSITION_X,POSITION_Y\n(pixel),(pixel)\n" + table(None, X, Y), "is in pixels"),
+    "DeepLabCut": ("scorer,DLC,DLC,DLC\nbodyparts,head,head,head\ncoords,x,y,likelihood\n" + table(None, U, X, Y, U),
+        "DeepLabCut .* pixels"),
     "a pointer of Git LFS": ("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n", "git lfs pull"),
     "noise": (bytes(range(256)) * 9, "neither text nor"),
     "an image": (b"\x89PNG\r\n\x1a\n" + bytes(99), "an image"),
@@ -238,6 +261,32 @@ def test_many_repeated_points_are_counted(tmp_path, caplog):
 def test_millimetres_without_a_unit_are_remarked_upon(tmp_path, caplog):
     read_route(write(tmp_path, "r.csv", table("x,y", 1e3 * X, 1e3 * Y)))
     assert "'x' and 'y' have no unit; taken as metres, the route is 2400 m wide" in caplog.text
+
+
+def test_degrees_without_a_unit_are_remarked_upon(tmp_path, caplog):
+    read_route(write(tmp_path, "r.csv", table("X,Y", 1e-2 * X, 50 + 1e-2 * Y)))
+    assert "the route is 0.024 m wide. If they are degrees on the globe, convert them" in caplog.text
+
+
+def test_numbers_of_rows_without_a_name_are_no_positions(tmp_path, caplog):
+    rows = [f'"{n}"' for n in range(1, 61)]
+    assert same(read_route(write(tmp_path, "r.txt", table('"x" "y" "heading"', rows, X, Y, HEADING, separator=" "))))
+    assert "the first is taken as the number of the row" in caplog.text
+
+
+def test_a_lost_animal_is_a_gap_however_it_is_written(tmp_path, caplog):
+    rows = table("x_m,y_m,qx,qy,qz,qw", X, Y, 0 * X, 0 * X, np.sin(RADIANS / 2), np.cos(RADIANS / 2)).split("\n")
+    rows[5], rows[30] = "inf,inf,0,0,0,1", f"{X[29]:.6f},{Y[29]:.6f},0,0,0,0"
+    route = read_route(write(tmp_path, "r.csv", "\n".join(rows)))
+    assert np.allclose(route.poses[:, 2], np.radians(np.delete(HEADING, [4, 29])), atol=1e-4)
+    assert "2 of 60 rows lack a number and are left out (lines 6, 31)" in caplog.text
+
+
+@pytest.mark.parametrize("up", [False, True])
+def test_a_path_over_x_and_z_is_remarked_upon(tmp_path, caplog, up):
+    columns = (X, 1 + 1e-4 * U, Y) if up else (X, Y, 1 + 1e-4 * U)
+    read_route(write(tmp_path, "r.csv", table("pos_x,pos_y,pos_z", *columns)))
+    assert ("if y is up, export the track with z up" in caplog.text) == up
 
 
 def wavy(noise: float, rows: int = 3000) -> tuple[np.ndarray, np.ndarray]:

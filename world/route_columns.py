@@ -24,8 +24,8 @@ ANGLES = dict.fromkeys(["deg", "degree", "degrees", "°"], (np.pi / 180, "degree
 ANGLES |= dict.fromkeys(["rad", "radian", "radians"], (1.0, "radians"))
 PIXELS = ("px", "pix", "pixel", "pixels")
 POSITIONS = {
-    **dict.fromkeys(["x", "px", "posx", "xpos", "easting", "east"], "x"),
-    **dict.fromkeys(["y", "py", "posy", "ypos", "northing", "north"], "y"),
+    **dict.fromkeys(["x", "px", "tx", "posx", "xpos", "easting", "east"], "x"),
+    **dict.fromkeys(["y", "py", "ty", "posy", "ypos", "northing", "north"], "y"),
 }
 # Words for headings; of the second kind one is taken where none of the first is there.
 CERTAIN = ("heading", "hdg", "yaw", "theta", "bearing", "azimuth")
@@ -37,9 +37,16 @@ FILLERS = re.findall(
     """
     pos position pose point coord coords coordinate coordinates location loc field utm world map local ground
     truth gt raw filtered smooth smoothed centre center centroid head body robot ant agent animal true magnetic
-    gps imu of the
+    gps imu odom odometry of the wcentroid pcentroid
     """,
-)
+)  # the last two as in TRex: "X#wcentroid (cm)"
+EUROC = ["p", "rs", "r"]  # positions of EuRoC: "p_RS_R_x [m]"
+QUATERNION = re.compile(r"(?:quaternion|quat|orientation|rotation|q|qrs)([xyzw])")
+TRACKS = {  # words for what a row belongs to, where a file holds several tracks
+    *("track", "trajectory", "individual", "subject", "particle", "identity", "tag", "trial"),
+    *("animal", "ant", "bee", "insect", "fly", "fish"),
+}
+NUMBERS = {"id", "no", "nr", "number", "name", "local", "identifier"}  # words beside those
 GEOGRAPHIC = {"lat", "latitude", "lon", "long", "lng", "longitude"}
 
 
@@ -71,6 +78,8 @@ def column_of(name: str) -> Column | None:
     words = [word for word in _words(name)[0] if word not in FILLERS]
     if len(words) == 2 and words[0] == "compass":
         words = words[1:]
+    if words[:3] == EUROC:
+        words = words[3:]
     if len(words) != 1:
         return None
     axis = POSITIONS.get(words[0]) or ("heading" if words[0] in (*CERTAIN, *POSSIBLE) else None)
@@ -134,6 +143,38 @@ def find_columns(names: list[str]) -> dict[str, tuple[int, Column]]:
     return found
 
 
+def find_quaternion(names: list[str]) -> list[int] | None:
+    """Indices of the columns that hold x, y, z and w of an orientation, or None where one is missing or there twice."""
+    parts = {}
+    for index, name in enumerate(names):
+        if match := QUATERNION.fullmatch("".join(word for word in _words(name)[0] if word not in FILLERS)):
+            parts.setdefault(match[1], []).append(index)
+    return [parts[part][0] for part in "xyzw"] if [len(parts.get(part, ())) for part in "xyzw"] == [1] * 4 else None
+
+
+def find_height(names: list[str]) -> int | None:
+    """Index of the only column z, or None."""
+    found = [
+        index
+        for index, name in enumerate(names)
+        if [word for word in _words(name)[0] if word not in FILLERS] in (["z"], ["tz"], ["posz"], ["zpos"])
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+def names_tracks(name: str) -> bool:
+    """Whether a column of this name tells several tracks apart."""
+    words = set(_words(name)[0])
+    return words == {"id"} or bool(words & TRACKS and words <= TRACKS | NUMBERS)
+
+
+def with_unit(name: str, cell: str) -> str:
+    """The name of a column, with the unit in a cell beneath it where it has none of its own."""
+    unit = cell.strip("()[]{} ").lower()
+    known = unit in {*LENGTHS, *ANGLES, *PIXELS}
+    return f"{name} [{unit}]" if known and name and _words(name)[1] is None else name
+
+
 def as_of_database(heading: Column, names: list[str]) -> Column:
     """A column of headings, which are bearings where the names are those of an image database of the BoB format."""
     is_database = {"X [mm]", "Heading [degrees]"} <= set(names)
@@ -146,7 +187,7 @@ def parse_columns(text: str) -> list[str]:
     names = ["" if name == "-" else name for name in names]
     try:
         for name in filter(None, names):
-            if column_of(name) is None:
+            if column_of(name) is None and name not in ("qx", "qy", "qz", "qw"):
                 raise FileError(f"{name!r} is not a column of a route")
         found = find_columns(names)
     except FileError as error:

@@ -1,6 +1,7 @@
 """The points of a route in a file of any kind that is known, before it is decided what their headings mean."""
 
 import logging
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,13 +11,15 @@ from jaxtyping import Float
 from .errors import FileError, SettingError
 from .file_kinds import kind_of, looks_like_world
 from .route_arrays import read_mat, read_npy, read_npz
-from .route_columns import Column, chosen_column, find_columns, parse_columns
-from .route_tables import columns_of, decode, read_table
+from .route_columns import Column, chosen_column, find_columns, find_height, find_quaternion, parse_columns
+from .route_tables import TextTable, columns_of, decode, read_table
 
 logger = logging.getLogger(__name__)
 
 WORLD = "it is not a route: it is a world ({}); give it as --world"
 MAX_GAPS = 0.05  # of the rows may lack a number
+POSES = re.compile(r"scorer,|[^\n]*\binstance\.score\b")  # how tables of DeepLabCut and SLEAP begin
+FLAT = 0.1  # of the extent in z; a path that is flatter in y may be one over x and z
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log", "")
 
 
@@ -75,12 +78,20 @@ def read_points(path: Path, columns: str | None) -> Points:
 
 def _of_text(text: str, columns: str | None) -> Points:
     """The points in a table; rows with gaps are left out while they are few."""
+    if columns is None and POSES.match(text):
+        raise FileError(
+            "it is of DeepLabCut or SLEAP, in pixels; write x and y of one body part, times the metres of a pixel, as x_m,y_m"
+        )
     table = read_table(text, None if columns is None else parse_columns(columns))
     found = columns_of(table)
     values = np.array([table.column(index, column) for index, column in found.values()])
     if "heading" in found and values.size and np.isnan(values[2]).all():
         logger.warning("the column %r is empty: each point faces the next one", found.pop("heading")[1].name)
         values = values[:2]
+    if "heading" not in found and (quaternion := find_quaternion(table.names or [])):
+        found["heading"] = quaternion[2], Column("heading", (table.names or [])[quaternion[2]], 1.0, "radians", True)
+        values = np.vstack([values[:2], _yaw(*(table.column(index, found["heading"][1]) for index in quaternion))])
+    _remark_on_y_up(table, found["y"][1], values)
     lost: np.ndarray = np.asarray(np.isnan(values).any(axis=0))
     if lost.sum() > MAX_GAPS * len(lost):
         row = int(lost.argmax())
@@ -90,6 +101,33 @@ def _of_text(text: str, columns: str | None) -> Points:
     points = _of_columns({axis: column for axis, (_, column) in found.items()}, values[:, ~lost])
     points.gaps = [table.lines[row] for row in np.flatnonzero(lost)]
     return points
+
+
+def _yaw(x, y, z, w) -> Float[np.ndarray, " n"]:
+    """Heading (rad, counter-clockwise from +x) of orientations as quaternions; nan where all of one is 0, as where a tracker lost it."""
+    yaw = np.arctan2(2 * (w * z + x * y), w**2 + x**2 - y**2 - z**2)
+    return np.where(x**2 + y**2 + z**2 + w**2 > 0, yaw, np.nan)
+
+
+def _remark_on_y_up(table: TextTable, y: Column, values: Float[np.ndarray, "axes n"]) -> None:
+    """Warn of a path over x and z: y is up in motion capture and in game engines."""
+    index = find_height(table.names or [])
+    if index is None or np.isnan(values[:2]).all():
+        return
+    z = chosen_column((table.names or [])[index], "y")
+    x_extent, y_extent = np.nanmax(values[:2], axis=1) - np.nanmin(values[:2], axis=1)
+    numbers = table.column(index, z)
+    z_extent = 0.0 if np.isnan(numbers).all() else float(np.nanmax(numbers) - np.nanmin(numbers))
+    if y_extent < FLAT * z_extent and x_extent < z_extent / FLAT:
+        logger.warning(
+            "%r varies by %.3g and %r by %.3g: if y is up, export the track with z up, or give --columns with y for %r (which mirrors it "
+            "where x, y, z are right-handed)",
+            y.name,
+            y_extent,
+            z.name,
+            z_extent,
+            z.name,
+        )
 
 
 def _of_columns(columns: dict[str, Column], values: Float[np.ndarray, "axes n"]) -> Points:

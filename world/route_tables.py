@@ -3,6 +3,7 @@
 import codecs
 import csv
 import io
+import logging
 import re
 from dataclasses import dataclass
 
@@ -10,11 +11,16 @@ import numpy as np
 from jaxtyping import Float
 
 from .errors import FileError, InputError
-from .route_columns import Column, find_columns, is_geographic
+from .route_columns import Column, find_columns, is_geographic, names_tracks, with_unit
+
+logger = logging.getLogger(__name__)
 
 SEPARATORS = (";", "\t", ",", " ")
 COMMENTS = ("#", "%", "//")
-EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # cells where a tracker lost the animal
+EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "infinity")  # cells where a tracker lost the animal
+MAX_PREAMBLE = 100  # lines about the recording, before the names of the columns
+MAX_SUBHEADER = 5  # lines with other names and with units, below them
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?")
 WORD = re.compile(
     r'"[^"]*"|[^\s\[(]*[\[(][^\])]*[\])]|\S+(?:\s+[\[(][^\])]*[\])])?'
 )  # separated by spaces; units stay with names
@@ -101,21 +107,54 @@ def read_table(text: str, columns: list[str] | None = None) -> TextTable:
         header, line = columns, 0
         if columns is None and comments:  # names in the comment before the numbers, as numpy.savetxt writes them
             line = comments[-1]
-            names = lines[line].strip().lstrip("#%/ \t")
-            header = next((cells for each in SEPARATORS if _has_xy(cells := _split(names, each))), None)
-        begin = used[0]
-    else:
-        separator = next((each for each in SEPARATORS if _has_xy(_split(first, each))), None)
-        if separator is None and columns is not None:  # names that mean nothing: as many as there are in the next line
-            second = lines[used[1]] if len(used) > 1 else ""
-            separator = next((kind[0] for kind in kinds if _is_numeric(_split(second, kind[0]), kind[1])), None)
-        separator = separator or ","
-        line, begin = (used[0], used[0] + 1) if used else (0, 0)
-        header, comma = columns or _split(first, separator), False
-    rows, numbers = _rows(lines, begin, separator)
-    if numeric is None:
-        comma = separator != "," and any(re.fullmatch(r"[-+]?\d*,\d+", cell) for cells in rows[:100] for cell in cells)
+            header = next((cells for each in SEPARATORS if _has_xy(cells := _split(_bare(lines[line]), each))), None)
+        return TextTable(header, line + 1, *_rows(lines, used[0], separator), comma)
+    named = _named(lines, used, comments)
+    line, separator = named or (used[0] if used else 0, None)
+    if separator is None and columns is not None:  # names that mean nothing: as many as there are in the next line
+        second = lines[used[1]] if len(used) > 1 else ""
+        separator = next((kind[0] for kind in kinds if _is_numeric(_split(second, kind[0]), kind[1])), None)
+    separator = separator or ","
+    header = columns or _split(_bare(lines[line]), separator)
+    has_data = columns is not None and named is None and any(map(NUMBER.fullmatch, _split(first, separator)))
+    rows, numbers = _rows(lines, line + (not has_data), separator)
+    header, rows, numbers = _below_names(header, rows, numbers)
+    if (
+        columns is None and rows and all(len(cells) == len(header) + 1 and cells[-1] for cells in rows)
+    ):  # R's write.table
+        logger.warning("each row has one cell more than there are names; the first is taken as the number of the row")
+        header = ["", *header]
+    comma = separator != "," and any(re.fullmatch(r"[-+]?\d*,\d+", cell) for cells in rows[:100] for cell in cells)
     return TextTable(header, line + 1, rows, numbers, comma)
+
+
+def _bare(line: str) -> str:
+    """A line without the characters that make it a comment."""
+    return line.strip().lstrip("#%/ \t") if line.lstrip().startswith(COMMENTS) else line
+
+
+def _named(lines: list[str], used: list[int], comments: list[int]) -> tuple[int, str] | None:
+    """The line with names of columns, and their separator: the first line, the comment before it, or one below a text on the recording."""
+    for number in [*used[:1], *comments[-1:], *used[1:MAX_PREAMBLE]]:
+        for separator in SEPARATORS:
+            names = _split(_bare(lines[number]), separator)
+            if _has_xy(names) and (number in used or len(names) == len(_split(lines[used[0]], separator))):
+                return number, separator
+    return None
+
+
+def _below_names(
+    names: list[str], rows: list[list[str]], numbers: list[int]
+) -> tuple[list[str], list[list[str]], list[int]]:
+    """Names with the units of the lines below them, and the rows without these lines."""
+    begin = 0
+    while begin < min(MAX_SUBHEADER, len(rows)) and not any(map(NUMBER.fullmatch, rows[begin])):
+        begin += 1
+    if begin == len(rows):
+        begin = 0
+    for cells in rows[:begin]:
+        names = [with_unit(name, cell) for name, cell in zip(names, cells, strict=False)] + names[len(cells) :]
+    return names, rows[begin:], numbers[begin:]
 
 
 def _rows(lines: list[str], begin: int, separator: str) -> tuple[list[list[str]], list[int]]:
@@ -164,9 +203,12 @@ def _has_xy(cells: list[str]) -> bool:
 def columns_of(table: TextTable) -> dict[str, tuple[int, Column]]:
     """Index and meaning of the columns of a route in a table. Raises FileError where x or y is missing."""
     if table.names is None:
-        count = len(table.rows[0])
+        count, row = len(table.rows[0]), " ".join(table.rows[0])[:60]
         example = ",".join((["x", "y", "heading"] + ["-"] * count)[:count]) if count > 1 else "x,y"
-        raise FileError(f"line {table.lines[0]}: the columns have no names; give them, as --columns {example}")
+        raise FileError(
+            f"line {table.lines[0]}: the columns have no names; give them, as --columns {example} (in their order, - skips one; "
+            f"the line is {row!r})"
+        )
     try:
         found = find_columns(table.names)
     except FileError as error:
@@ -180,4 +222,20 @@ def columns_of(table: TextTable) -> dict[str, tuple[int, Column]]:
         raise FileError(
             f"line {table.line}: the columns are {header!r}; a route needs x_m,y_m,heading_deg, or --columns with names in their order"
         )
+    _refuse_several_tracks(table)
     return found
+
+
+def _refuse_several_tracks(table: TextTable) -> None:
+    """Refuse a table whose rows belong to several tracks, by a column such as ant_id. Raises FileError."""
+    for index, name in enumerate(table.names or ()):
+        if not names_tracks(name):
+            continue
+        cells = [cells[index] for cells in table.rows if index < len(cells)]
+        values = list(dict.fromkeys(cell for cell in cells if cell.lower() not in EMPTY))
+        if 2 <= len(values) <= len(cells) / 3:  # else it numbers the rows
+            listed = ", ".join(values[:3]) + (", .." if len(values) > 3 else "")
+            raise FileError(
+                f"it holds {len(values)} tracks by its column {name!r} ({listed}); keep the rows of one, or give --columns to read all "
+                "as one"
+            )
