@@ -114,6 +114,10 @@ def test_columns_that_names_do_not_tell_are_given(folder, tmp_path):
     assert np.allclose(named.poses, BEND)
     with pytest.raises(SettingError, match="--columns 'x=Q'"):
         read_track(track, "x=Q")
+    track.write_text("lat,lon,yaw\n50.86806,-0.09823,0\n50.86807,-0.09824,0\n")
+    for columns in (None, "x=lon,y=lat"):
+        with pytest.raises(FileError, match="degrees on the globe"):
+            read_track(track, columns)
 
 
 def test_headings_of_another_convention_are_refused_with_its_name(folder, tmp_path):

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tussock.navigation.cli.main import main
-from tussock.render.images.camera import Camera, read_calibration
+from tussock.render.images.calibration import read_calibration
+from tussock.render.images.camera import Camera
 from tussock.render.images.pictures import read_image
 from tussock.render.images.ring_search import find_ring
 from tussock.render.images.unwrapping import Fisheye, Omnidirectional, Panorama, Ring, Unwrapping
@@ -221,7 +222,44 @@ def test_lists_and_the_camera_info_of_ros_are_read(tmp_path):
     assert read_calibration(tmp_path / "b.yaml", "fisheye", 640, 480) == Fisheye(**FISHEYE)
 
 
+FX, FY, CX, CY = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+TERMS = ", ".join(map(str, D))
+OTHER_PROGRAMS = {
+    "Kalibr's fisheye": ("fisheye", "cam0:\n  T_cam_imu:\n  - [1.0, 0.0]\n  - [0.0, 1.0]\n  camera_model: pinhole\n"
+        f"  distortion_coeffs: [{TERMS}]\n  distortion_model: equidistant\n  intrinsics: [{FX}, {FY}, {CX},\n    {CY}]\n"
+        "  resolution: [640, 480]\ncam1:\n  camera_model: pinhole\n  intrinsics: [9, 9, 9, 9]\n"),
+    "Kalibr's omni": ("omnidirectional", f"cam0:\n  camera_model: omni\n  distortion_coeffs: [{TERMS}]\n  distortion_model: radtan\n"
+        f"  intrinsics: [1.5, {FX}, {FY}, {CX}, {CY}]\n  resolution: [640, 480]\n"),
+    "camodocal's MEI": ("omnidirectional", "%YAML:1.0\n---\nmodel_type: MEI\nmirror_parameters:\n   xi: 1.5\ndistortion_parameters:\n"
+        f"   k1: {D[0]}\n   k2: {D[1]}\n   p1: {D[2]}\n   p2: {D[3]}\n"
+        f"projection_parameters:\n   gamma1: {FX}\n   gamma2: {FY}\n   u0: {CX}\n   v0: {CY}\n"),
+    "camodocal's KANNALA_BRANDT": ("fisheye", "%YAML:1.0\n---\nmodel_type: KANNALA_BRANDT\nprojection_parameters:\n"
+        f"   k2: {D[0]}\n   k3: {D[1]}\n   k4: {D[2]}\n   k5: {D[3]}\n   mu: {FX}\n   mv: {FY}\n   u0: {CX}\n   v0: {CY}\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("program", OTHER_PROGRAMS)
+def test_calibrations_of_other_programs_are_read(tmp_path, caplog, program):
+    lens, text = OTHER_PROGRAMS[program]
+    (tmp_path / "c.yaml").write_text(text)
+    expected = Fisheye(**FISHEYE) if lens == "fisheye" else Omnidirectional(**FISHEYE, xi=1.5)
+    assert read_calibration(tmp_path / "c.yaml", lens, 640, 480) == expected
+    assert not caplog.records
+    other = {"fisheye": "omnidirectional", "omnidirectional": "fisheye"}[lens]
+    with pytest.raises(FileError, match="is the calibration of another lens"):
+        read_calibration(tmp_path / "c.yaml", other, 640, 480)
+
+
+def test_a_lost_distortion_is_reported(tmp_path, caplog):
+    path = storage(tmp_path / "c.xml", CameraMatrix=K, DistortionCoeffs=D)
+    assert read_calibration(path, "fisheye", 640, 480) == Fisheye(**FISHEYE)
+    assert not caplog.records
+    read_calibration(storage(tmp_path / "d.xml", K=K, bending=D), "fisheye", 640, 480)
+    assert "no distortion D that is known by its name" in caplog.text
+
+
 def test_other_calibrations_are_refused_in_one_line(tmp_path):
+    (tmp_path / "ocam.txt").write_text("#polynomial coefficients for the DIRECT mapping function\n\n5 -271 0 1 2 3\n")
     five = storage(tmp_path / "five.yaml", K=K, D=np.zeros((1, 5)))
     sized = storage(tmp_path / "sized.yaml", K=K, D=D, image_width=100, image_height=100)
     (tmp_path / "text.yaml").write_text("a picture\n")
@@ -234,6 +272,13 @@ def test_other_calibrations_are_refused_in_one_line(tmp_path):
         (tmp_path / "text.yaml", "fisheye", "cannot be read|has no matrix"),
         (tmp_path / "lfs.yaml", "fisheye", "git lfs pull"),
         (tmp_path / "none.yaml", "fisheye", "cannot be read"),
+        (tmp_path / "ocam.txt", "omnidirectional", "OCamCalib, which is not read"),
+        (
+            storage(tmp_path / "p.yaml", K=K, D=D, distortion_model="plumb_bob"),
+            "fisheye",
+            r"another lens \(plumb_bob\)",
+        ),
+        (storage(tmp_path / "q.yaml", K=K, D=D, fisheye_model=0), "fisheye", r"another lens \(pinhole\)"),
     ):
         with pytest.raises(FileError, match=message) as refusal:
             read_calibration(path, lens, 640, 480)

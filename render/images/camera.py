@@ -8,11 +8,11 @@ from typing import Any
 
 import attrs
 
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import SettingError
 from tussock.world.settings import choice, number, settings, switch, whole
 
+from .calibration import read_calibration
 from .lens_metadata import MAX_COLUMNS, MIN_ASPECT, natural_size
-from .metadata import read_storage
 from .pictures import Picture
 from .ring_search import find_ring
 from .unwrapping import LOOKING, MAX_PIXEL, MAX_SIZE, Fisheye, Omnidirectional, Panorama, Ring, Unwrapping
@@ -21,8 +21,6 @@ log = logging.getLogger(__name__)
 
 LENSES = ("auto", "ring", "fisheye", "omnidirectional", "panorama", "equirectangular")
 TOP, BOTTOM = math.radians(60), math.radians(-15)  # as the published Sussex databases
-MATRICES = ("K", "camera_matrix", "cameramatrix", "intrinsic_matrix", "intrinsics", "mtx")
-DISTORTIONS = ("D", "distortion_coefficients", "dist_coeffs", "distcoeffs", "distortion", "dist")
 
 
 @settings
@@ -141,79 +139,3 @@ def _usual_size(lens: Ring | Panorama | Fisheye | Omnidirectional, top: float, b
         width = min(lens.width, MAX_COLUMNS) if whole_sphere else lens.width
         return width, max(1, round(lens.height * share * width / lens.width))
     return MAX_COLUMNS, max(1, round(MAX_COLUMNS * (top - bottom) / (2 * math.pi)))
-
-
-def read_calibration(path: Path, lens: str, width: int, height: int, **options: Any) -> Fisheye | Omnidirectional:
-    """Read the calibration of a lens.
-
-    Args:
-        path: YAML, JSON or XML, as OpenCV writes it, with K and D (or camera_matrix and distortion_coefficients), and xi.
-        lens: "fisheye" or "omnidirectional".
-        width: Of the pictures; K is scaled to it if the file states that it was calibrated at another size.
-        height: Of the pictures.
-        **options: Fields of the lens that the file does not have.
-
-    Raises:
-        FileError: It is not a calibration of this lens.
-    """
-    known = {key.lower(): value for key, value in _flat(read_storage(path)).items()}
-    matrix, distortion = (_matrix(known, names) for names in (MATRICES, DISTORTIONS))
-    if matrix is None or len(matrix) != 9:
-        raise FileError(f"{path} has no matrix K of 3 x 3 numbers; give the calibration of a {lens} lens")
-    distortion = distortion or [0.0] * 4
-    if len(distortion) < 4:
-        raise FileError(f"{path} has a distortion D of {len(distortion)} numbers; a {lens} lens has 4")
-    if len(distortion) > 4:
-        raise FileError(
-            f"{path} has a distortion D of {len(distortion)} numbers, as a lens of another kind; a {lens} lens has 4"
-        )
-    scale = _scale(known, width, height, path)
-    fx, skew, cx, _, fy, cy = matrix[:6]
-    numbers_of_k = (fx * scale, fy * scale, (cx + 0.5) * scale - 0.5, (cy + 0.5) * scale - 0.5, skew * scale)
-    try:
-        if lens == "fisheye":
-            return Fisheye(matrix=numbers_of_k, distortion=tuple(distortion), **options)
-        xi = _matrix(known, ("xi",))
-        if not xi:
-            raise FileError(f"{path} has no xi; give the calibration of an omnidirectional lens, or --lens fisheye")
-        return Omnidirectional(xi=xi[0], matrix=numbers_of_k, distortion=tuple(distortion), **options)
-    except SettingError as error:
-        raise FileError(f"{path} cannot be used as a calibration ({error})") from error
-
-
-def _flat(values: dict[str, Any]) -> dict[str, Any]:
-    """Values of nested groups under their own names; a matrix stays one."""
-    flat: dict[str, Any] = {}
-    for key, value in values.items():
-        if isinstance(value, dict) and "data" not in value:
-            flat = _flat(value) | flat
-        else:
-            flat[key] = value
-    return flat
-
-
-def _matrix(known: dict[str, Any], names: Sequence[str]) -> list[float] | None:
-    """The numbers of a matrix, row by row, however it is written."""
-    for name in names:
-        value = known.get(name.lower())
-        value = value.get("data") if isinstance(value, dict) else value
-        rows = value if isinstance(value, list) else [value]
-        cells = [cell for row in rows for cell in (row if isinstance(row, list) else [row])]
-        found = [float(cell) for cell in cells if isinstance(cell, int | float) and math.isfinite(cell)]
-        if found and len(found) == len(cells):
-            return found
-    return None
-
-
-def _scale(known: dict[str, Any], width: int, height: int, path: Path) -> float:
-    """By how much the pictures are larger than those of the calibration."""
-    size = _matrix(known, ("image_size", "imagesize", "img_size", "resolution"))
-    calibrated = size or [*(_matrix(known, ("image_width",)) or []), *(_matrix(known, ("image_height",)) or [])]
-    if len(calibrated) != 2 or min(calibrated) <= 0:
-        return 1.0
-    scale = width / calibrated[0]
-    if abs(height / calibrated[1] - scale) > 0.01 * scale:
-        raise FileError(
-            f"{path} is of pictures of {calibrated[0]:g} x {calibrated[1]:g}, these are {width} x {height}; give its own calibration"
-        )
-    return scale

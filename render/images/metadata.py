@@ -83,6 +83,9 @@ def _parse(text: str) -> dict[str, Any]:
         ("%", "{", "<")
     ):  # YAML without its first line, which readers of BoB robotics do not need
         text = f"%YAML:1.0\n---\n{text}"
+    text = re.sub(
+        r"(?m)^( *)- (?=\[)", r"\1  - ", text
+    )  # other writers of YAML do not indent lists of lists, as Kalibr's T_cam_imu
     depth = max(len(line) - len(line.lstrip(" ")) + line.count("-") + line.count(":") for line in text.split("\n"))
     if depth + sum(map(text.count, "[{<")) > MAX_DEPTH:
         raise ValueError("nested too deeply")

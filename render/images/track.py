@@ -12,7 +12,7 @@ from jaxtyping import Float
 from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.headings import CONVENTIONS, convert, diagnose, of_radians
-from tussock.world.route_columns import LENGTHS, Column, as_of_database, chosen_column, find_columns
+from tussock.world.route_columns import LENGTHS, Column, as_of_database, chosen_column, find_columns, is_geographic
 from tussock.world.route_tables import COMMENTS, decode
 
 from .pictures import check_content
@@ -177,6 +177,10 @@ def _found(header: list[str], columns: str | None) -> dict[str, int]:
         if same:
             found[role] = same[0]
     for axis in "xy":
+        if is_geographic([header[found[axis]]] if axis in found else header):
+            raise FileError(
+                f"its positions are degrees on the globe ({', '.join(header)[:200]}); convert them to metres (UTM)"
+            )
         if axis not in found:
             raise FileError(
                 f"there is no column {axis}, only {', '.join(filter(None, header))[:200]}; name it, as --columns {axis}=NAME"
