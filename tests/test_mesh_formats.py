@@ -255,6 +255,30 @@ def test_obj_files_are_read_as_people_write_them(tmp_path, text, expected):
         assert np.isclose(area(read_world(tmp_path / "w.obj")), expected)
 
 
+@pytest.mark.parametrize(
+    ("comment", "metres"),
+    [
+        ("# File units = inches", 0.0254),
+        ("# file units = Meters", 1.0),
+        ("# Units: mm", 0.001),
+        ("# units per em = 4", 1.0),
+        ("# File units = parsecs", 1.0),
+    ],
+)
+def test_the_unit_that_an_obj_states_is_taken(tmp_path, caplog, comment, metres):
+    (tmp_path / "w.obj").write_text(f"# Alias OBJ Model File\n{comment}\n\n{l_shaped_obj()}")
+    assert np.isclose(area(read_world(tmp_path / "w.obj")), 5 * metres**2)
+    assert ("says that its unit is" in caplog.text) == (metres != 1)
+    assert np.isclose(area(read_world(tmp_path / "w.obj", MeshReading(unit="cm"))), 5e-4)
+
+
+def test_a_ply_header_may_have_more_spaces_than_it_needs(tmp_path):
+    (tmp_path / "w.ply").write_bytes(
+        mixed_ply("").replace(b"element vertex 6", b"element  vertex   6 ").replace(b"float x", b"float\tx")
+    )
+    assert len(read_world(tmp_path / "w.ply").triangles) == 7
+
+
 def mixed_ply(order: str) -> bytes:
     """A quad, a triangle and an L, each with a colour; as text where the order is empty."""
     points = np.array([(x, 1, z) for x, z in L_SHAPE])
@@ -326,10 +350,14 @@ OTHERS = {
         (b"BLENDER-v300", "Blender"),
         (b"v 0 0 0\nv 1 0 0\nv 1 1 1\n", "point cloud of 3 points.*Poisson"),
         (b"# nothing\n", "no triangles"),
+        (b"v 0 0 0\nv 1 0 0\nl 1 2\n", "no triangles, only lines"),
+        (b"v 0 0 0\nv 1 0 0\ncstype bspline\ndeg 1\ncurv 0 1 1 2\nparm u 0 0 1 1\nend\n", "only free-form curves and surfaces"),
     ],
     "w.ply": [
         (b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n1 1 1\n",
          "point cloud of 2 points"),
+        (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n"
+         b"property list int int vertex_indices\nend_header\n0 0 0\n4 0 0 0 -1\n", "tristrips.*MeshLab"),
         (b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n", "no triangles"),
     ],
     "w.xyz": [(b"0 0 0\n1 1 1\n1 2 3\n", "point cloud of 3 points")],

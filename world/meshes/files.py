@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from ..errors import FileError, InputError, first_line
@@ -18,7 +19,7 @@ from ..world_data import DEFAULT_SKY, KEY, from_json, is_y_up
 from .appearance import appearance_of
 from .axes import turned_z_up
 from .gltf import prepared_gltf
-from .obj import prepared_obj
+from .obj import prepared_obj, stated_unit
 from .ply import prepared_ply
 from .reading import MeshReading
 from .remarks import remarks_on_axes_and_units
@@ -44,6 +45,7 @@ class MeshFile:
         float32: Whether its format stores coordinates in 32 bits.
         step: Between neighbouring ones of these (in units of the file); 0 where they are stored with more digits.
         remarks: What is not read.
+        unit: Name of the unit that the file states, or None.
     """
 
     kind: str
@@ -53,6 +55,7 @@ class MeshFile:
     float32: bool = False
     step: float = 0.0
     remarks: list[str] = field(default_factory=list)
+    unit: str | None = None
 
 
 def read_mesh(path: Path, reading: MeshReading) -> World:
@@ -61,6 +64,10 @@ def read_mesh(path: Path, reading: MeshReading) -> World:
 
     kind = _kind(path, trimesh.available_formats())
     file = _readable(path, lambda: _prepared(path, kind))
+    if file.unit and not reading.unit_given:
+        reading = attrs.evolve(reading, unit=file.unit)
+        if file.unit != "m":
+            log.warning(f"{path}: a comment in it says that its unit is {file.unit}; --unit m takes metres")
     scene = _readable(
         path,
         lambda: trimesh.load_scene(io.BytesIO(file.data), file_type=file.kind, resolver=file.search, process=False),
@@ -101,7 +108,9 @@ def _kind(path: Path, known: set[str]) -> str:
         return content.name.lower()
     kind = path.suffix.lower().lstrip(".")
     if kind not in known or kind in ARCHIVES:
-        raise FileError(f"unknown kind of world {path.suffix!r}; give .glb, .gltf, .ply, .obj, .stl or AntWorld .bin")
+        raise FileError(
+            f"unknown kind of world {path.suffix!r}; give .glb, .gltf, .ply, .obj, .stl, .off or AntWorld .bin"
+        )
     return kind
 
 
@@ -122,7 +131,7 @@ def _prepared(path: Path, kind: str) -> MeshFile:
         data, remarks = prepared_gltf(path, search)
         return MeshFile("glb", data, search, float32=True, remarks=remarks)
     if kind == "obj":
-        return MeshFile(kind, prepared_obj(path, search), search)
+        return MeshFile(kind, prepared_obj(path, search), search, unit=stated_unit(path))
     if kind == "ply":
         data, header = prepared_ply(path)
         return MeshFile(kind, data, search, own=header.comment(KEY), float32=header.stores_float32())

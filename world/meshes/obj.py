@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import FileError
 from .polygons import triangulated
 from .search import Neighbours
 
@@ -15,6 +16,18 @@ MAP_OPTIONS = {  # of a texture in an MTL file, and how many values follow
     "-t": 3, "-texres": 1, "-type": 1,
 }  # fmt: skip
 OPTIONAL_VALUES = ("-o", "-s", "-t")  # of their three values, the last two may be left out
+HEAD = 4096  # bytes in which a unit may be stated
+UNIT_NAMES = {
+    name: unit
+    for unit, names in {
+        "mm": "mm millimeters millimetres",
+        "cm": "cm centimeters centimetres",
+        "m": "m meters metres",
+        "in": "in inch inches",
+        "ft": "ft foot feet",
+    }.items()
+    for name in names.split()
+}
 USED_MAPS = ("map_kd", "map_d")
 
 
@@ -31,6 +44,10 @@ def prepared_obj(path: Path, search: Neighbours) -> bytes:
     if "#" in text:
         text = re.sub(r"\n#[^\n]*", "\n", text)
         text = re.sub(r"\n((?:v|vt|vn|f) [^#\n]*)#[^\n]*", r"\n\1", text)
+    other = None if "\nf " in text else re.search(r"\n(l|curv|curv2|surf) ", text)
+    if other:
+        content = "lines" if other[1] == "l" else "free-form curves and surfaces"
+        raise FileError(f"it holds no triangles, only {content}; export it with surfaces as polygons")
     if re.search(r"\nf[^\n]*-", text):
         text = "\n".join(_with_absolute_indices(text.split("\n")))
     if re.search(r"\nf +\d+/\d", text) and re.search(r"\nf +\d+(?://\d+)? ", text):
@@ -43,6 +60,14 @@ def prepared_obj(path: Path, search: Neighbours) -> bytes:
     used = {name.strip() for name in re.findall(r"\nusemtl +([^\n]*)", text)}
     search.texts[LIBRARY] = _materials(libraries, used, search).encode()
     return text.encode()
+
+
+def stated_unit(path: Path) -> str | None:
+    """The unit in the comments before the first vertex, as SketchUp writes it ("# File units = inches"), or None."""
+    with path.open("rb") as file:
+        head = file.read(HEAD).decode("latin-1").partition("\nv ")[0]
+    stated = re.search(r"^#\s*(?:file )?units?\s*[=:]\s*([a-z]+)\s*$", head, re.IGNORECASE | re.MULTILINE)
+    return UNIT_NAMES.get(stated[1].lower()) if stated else None
 
 
 def _decoded(data: bytes) -> str:

@@ -27,6 +27,10 @@ def prepared_ply(path: Path) -> tuple[bytes, Header]:
     """The file as trimesh reads it, with triangles only; and its header."""
     data = path.read_bytes()
     header = read_header(data)
+    if any(element.name == "tristrips" and element.length for element in header.elements):
+        raise FileError(
+            "its triangles are in strips (tristrips), which are not read; open it in MeshLab or CloudCompare and save it again"
+        )
     if header.order and _holds_triangles_alone(header, data):
         return data, header
     columns = _read(header, data)

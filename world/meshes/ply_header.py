@@ -76,14 +76,15 @@ def read_header(data: bytes) -> Header:
         end = data.find(b"\n", at)
         if end < 0:
             raise FileError("it cannot be read as PLY: its header does not end; copy or export it again")
-        words = data[at:end].decode("utf-8", errors="replace").strip().split(" ")
+        line = data[at:end].decode("utf-8", errors="replace").strip()
+        words = line.split() or [""]
         at = end + 1
         if words[0] == "end_header":
             return Header(order, elements, comments, at)
         if words[0] == "format":
             order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[words[1]]
         elif words[0] in ("comment", "obj_info"):
-            comments.append(" ".join(words[1:]))
+            comments.append(line.partition(" ")[2])
         elif words[0] == "element":
             elements.append(Element(words[1], int(words[2]), []))
         elif words[0] == "property" and words[1] == "list":
