@@ -359,6 +359,13 @@ def test_arrays_are_understood(tmp_path, kind):
     assert same(read_route(write(tmp_path, name, content), columns=columns))
 
 
+def test_several_tracks_in_arrays_are_refused(tmp_path):
+    path = write(tmp_path, "r.mat", mat(x_pos=np.repeat(X, 2), y_pos=np.repeat(Y, 2), identity=np.tile([0.0, 1.0], 60)))
+    with pytest.raises(InputError, match="holds 2 tracks by its column 'identity'"):
+        read_route(path)
+    assert len(read_route(path, columns="x_pos,y_pos").xy) == 60
+
+
 def test_npz_holds_arrays_by_name(tmp_path):
     np.savez_compressed(tmp_path / "r.npz", x=X, y=Y, heading=HEADING)
     assert same(read_route(tmp_path / "r.npz"))

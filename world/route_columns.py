@@ -1,6 +1,7 @@
 """What the names of a table's columns mean for a route: which hold x, y and the heading, and in which unit."""
 
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -162,10 +163,25 @@ def find_height(names: list[str]) -> int | None:
     return found[0] if len(found) == 1 else None
 
 
-def names_tracks(name: str) -> bool:
-    """Whether a column of this name tells several tracks apart."""
-    words = set(_words(name)[0])
-    return words == {"id"} or bool(words & TRACKS and words <= TRACKS | NUMBERS)
+def refuse_several_tracks(names: Sequence[str], values_of: Callable[[int], list]) -> None:
+    """Refuse columns such as ant_id whose values tell several tracks apart. Raises FileError.
+
+    Args:
+        names: Of the columns.
+        values_of: Gives the values of the column with an index, without empty ones.
+    """
+    for index, name in enumerate(names):
+        words = set(_words(name)[0])
+        if words != {"id"} and not (words & TRACKS and words <= TRACKS | NUMBERS):
+            continue
+        values = values_of(index)
+        different = list(dict.fromkeys(values))
+        if 2 <= len(different) <= len(values) / 3:  # else it numbers the rows
+            listed = ", ".join(map(str, different[:3])) + (", .." if len(different) > 3 else "")
+            raise FileError(
+                f"it holds {len(different)} tracks by its column {name!r} ({listed}); keep the rows of one, or give --columns to read "
+                "all as one"
+            )
 
 
 def with_unit(name: str, cell: str) -> str:

@@ -11,7 +11,15 @@ from jaxtyping import Float
 from .errors import FileError, SettingError
 from .file_kinds import kind_of, looks_like_world
 from .route_arrays import read_mat, read_npy, read_npz
-from .route_columns import Column, chosen_column, find_columns, find_height, find_quaternion, parse_columns
+from .route_columns import (
+    Column,
+    chosen_column,
+    find_columns,
+    find_height,
+    find_quaternion,
+    parse_columns,
+    refuse_several_tracks,
+)
 from .route_tables import TextTable, columns_of, decode, read_table
 
 logger = logging.getLogger(__name__)
@@ -180,9 +188,11 @@ def _of_arrays(arrays: dict[str, np.ndarray], columns: str | None) -> Points:
         array, names = chosen[0], ""
     vectors = [name for name, each in arrays.items() if each.ndim == 1]
     if not array and not names:
-        found = find_columns([name.rpartition(".")[2] for name in vectors])
+        labels = [name.rpartition(".")[2] for name in vectors]
+        found = find_columns(labels)
         if {"x", "y"} <= found.keys():
             used = [vectors[index] for index, _ in found.values()]
+            refuse_several_tracks(labels, lambda index: arrays[vectors[index]].tolist())
             return _of_columns({axis: column for axis, (_, column) in found.items()}, _stacked(arrays, used))
     name, matrix = _matrix(arrays, array, any_width=bool(names))
     header = parse_columns(names) if names else ["x", "y", "heading"][: matrix.shape[1]]

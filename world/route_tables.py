@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .errors import FileError, InputError
-from .route_columns import Column, find_columns, is_geographic, names_tracks, with_unit
+from .route_columns import Column, find_columns, is_geographic, refuse_several_tracks, with_unit
 
 logger = logging.getLogger(__name__)
 
@@ -222,20 +222,8 @@ def columns_of(table: TextTable) -> dict[str, tuple[int, Column]]:
         raise FileError(
             f"line {table.line}: the columns are {header!r}; a route needs x_m,y_m,heading_deg, or --columns with names in their order"
         )
-    _refuse_several_tracks(table)
+    refuse_several_tracks(
+        table.names,
+        lambda index: [row[index] for row in table.rows if index < len(row) and row[index].lower() not in EMPTY],
+    )
     return found
-
-
-def _refuse_several_tracks(table: TextTable) -> None:
-    """Refuse a table whose rows belong to several tracks, by a column such as ant_id. Raises FileError."""
-    for index, name in enumerate(table.names or ()):
-        if not names_tracks(name):
-            continue
-        cells = [cells[index] for cells in table.rows if index < len(cells)]
-        values = list(dict.fromkeys(cell for cell in cells if cell.lower() not in EMPTY))
-        if 2 <= len(values) <= len(cells) / 3:  # else it numbers the rows
-            listed = ", ".join(values[:3]) + (", .." if len(values) > 3 else "")
-            raise FileError(
-                f"it holds {len(values)} tracks by its column {name!r} ({listed}); keep the rows of one, or give --columns to read all "
-                "as one"
-            )
