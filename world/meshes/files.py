@@ -122,7 +122,8 @@ def _prepared(path: Path, kind: str) -> MeshFile:
         data, remarks = prepared_gltf(path, search)
         return MeshFile("glb", data, search, float32=True, remarks=remarks)
     if kind == "obj":
-        return MeshFile(kind, prepared_obj(path, search), search)
+        data, remarks = prepared_obj(path, search)
+        return MeshFile(kind, data, search, remarks=remarks)
     if kind == "ply":
         data, header = prepared_ply(path)
         return MeshFile(kind, data, search, own=header.comment(KEY), float32=header.stores_float32())
