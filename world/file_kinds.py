@@ -131,6 +131,14 @@ def head_of(path: Path) -> bytes:
         return file.read(HEAD)
 
 
+def mesh_format(path: Path) -> str:
+    """The format of a mesh, as the suffix of its file; of a GLB or a PLY by its content."""
+    content = kind_of(head_of(path))
+    if content is not None and content.name in ("GLB", "PLY"):
+        return content.name.lower()
+    return path.suffix.lower().lstrip(".")
+
+
 def numbers_in(path: Path) -> Float[np.ndarray, " n"]:
     """The numbers of an AntWorld `.bin`."""
     return np.fromfile(path, dtype="<f8")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError, InputError, first_line
-from ..file_kinds import MAKE_A_MESH, head_of, kind_of
+from ..file_kinds import MAKE_A_MESH, mesh_format
 from ..geometry import Bounds
 from ..origin import origin_of, shown
 from ..scene import World
@@ -96,10 +96,7 @@ def _stands_with_z_up(path: Path, meshes: list, reading: MeshReading) -> bool:
 
 def _kind(path: Path, known: set[str]) -> str:
     """What trimesh calls the format of a file. Raises FileError for an unknown one."""
-    content = kind_of(head_of(path))
-    if content is not None and content.name in ("GLB", "PLY"):
-        return content.name.lower()
-    kind = path.suffix.lower().lstrip(".")
+    kind = mesh_format(path)
     if kind not in known or kind in ARCHIVES:
         raise FileError(f"unknown kind of world {path.suffix!r}; give .glb, .gltf, .ply, .obj, .stl or AntWorld .bin")
     return kind

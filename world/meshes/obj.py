@@ -25,7 +25,7 @@ def prepared_obj(path: Path, search: Neighbours) -> tuple[bytes, list[str]]:
 
     What it names and is not found is entered in `search.missing`. Also gives remarks about what is not read.
     """
-    text = _decoded(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
+    text = decoded(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
     text = f"\n{text}\n"
     text = re.sub(r"\n[ \t]+", "\n", text) if "\n " in text or "\n\t" in text else text
     if "\t" in text:
@@ -51,7 +51,7 @@ def prepared_obj(path: Path, search: Neighbours) -> tuple[bytes, list[str]]:
     return text.encode(), remarks
 
 
-def _decoded(data: bytes) -> str:
+def decoded(data: bytes) -> str:
     """The text in a file: UTF-8, UTF-16 with a mark, or Latin-1."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace").lstrip("\ufeff")
@@ -130,7 +130,7 @@ def _materials(libraries: list[str], used: set[str], search: Neighbours) -> str:
             if path is None:
                 search.missing[name], complete = "is not found next to the file", False
             else:
-                lines += _material_lines(_decoded(path.read_bytes()), search)
+                lines += _material_lines(decoded(path.read_bytes()), search)
     known = {line.split(" ", 1)[1] for line in lines if line.startswith("newmtl ")}
     if complete:
         where = "is in none of its material files" if libraries else "is in no material file: it names none (mtllib)"
