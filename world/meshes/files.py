@@ -28,6 +28,8 @@ from .upright import only_stands_with_z_up
 log = logging.getLogger(__name__)
 
 MAX_TRIANGLES = 10**7  # of a world; each takes a few hundred bytes while it is read
+FLAT = 0.01  # of its width: a thinner mesh is a wall
+MAX_MARGIN = 10.0  # m, of the field around a wall
 ARCHIVES = ("zip", "bz2", "gz")  # trimesh would unpack them, whatever the size of their content
 GLTF = ("glb", "gltf")
 
@@ -182,14 +184,28 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
     rgb, texturing = appearance_of(meshes, path, file.search.get)
     own = _own_data(path, file.own, triangles) if file.own is not None else None
     if own is None:
-        corners_xy = triangles.reshape(-1, 3)[:, :2].astype(float)
         own = {
             "ground": None,
             "sky_rgb": DEFAULT_SKY,
-            "field": Bounds(*corners_xy.min(axis=0).tolist(), *corners_xy.max(axis=0).tolist()),
+            "field": _field(path, triangles),
             "origin_m": origin,
         }
     return World(triangles=triangles, rgb=rgb, texturing=texturing, **own)
+
+
+def _field(path: Path, triangles: np.ndarray) -> Bounds:
+    """Where an agent may be: the extent of the mesh; of a flat wall, in which nobody can stand, also what lies before and behind it."""
+    xy = triangles.reshape(-1, 3)[:, :2].astype(float)
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    width = float((high - low).max())
+    flat = high - low < FLAT * width
+    if flat.any():
+        margin = np.where(flat, min(width, MAX_MARGIN), 0.0)
+        low, high = low - margin, high + margin
+        log.info(
+            f"{path}: it is a flat wall along {'yx'[int(flat.argmax())]}, so agents may be up to {margin.max():g} m from it"
+        )
+    return Bounds(*low.tolist(), *high.tolist())
 
 
 def _say_far(path: Path, origin: tuple[float, float, float], step: float) -> None:
