@@ -111,12 +111,19 @@ def test_colours_of_vertices_are_display_colours_in_bytes_and_else_linear(read, 
     assert world.rgb.tolist() == [[shown] * 3] * 2
 
 
-def test_colours_of_vertices_times_the_texture_times_the_factor(read):
-    colours = np.full((4, 3), 128, np.uint8)
+@pytest.mark.parametrize(
+    ("kind", "value", "linear"), [("uint8", 128, None), ("uint16", 16384, 16384 / 65535), ("float32", 0.25, 0.25)]
+)
+def test_colours_of_vertices_times_the_texture_times_the_factor(read, kind, value, linear):
+    """In linear light, wherever on the wall; colours in bytes are display colours, others are linear."""
+    colours = np.full((4, 3), value, kind)
     material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1, 1, 1]}}
     world = read(wall_glb(material, image=png(np.full((2, 2, 3), 200)), TEXCOORD_0=UV, COLOR_0=colours))
-    light = to_linear(200 / 255) * to_linear(128 / 255) * np.array([0.5, 1, 1])
-    assert np.abs(np.array(at(world, 0.3, 0.6)[:3]) - 255 * to_display(light)).max() <= 1
+    corner = to_linear(value / 255) if linear is None else linear
+    light = to_linear(200 / 255) * corner * np.array([0.5, 1, 1])
+    for place in ((0.3, 0.6), (-0.8, 0.2)):
+        assert np.abs(np.array(at(world, *place)[:3]) - 255 * to_display(light)).max() <= 1
+    assert np.abs(world.rgb - 255 * to_display(light)).max() <= 1
 
 
 def test_colours_are_interpolated_in_perspective(read):

@@ -107,7 +107,9 @@ class _Reader:
         merged = dict(ALWAYS)
         for _, _, choice in places:
             merged |= choice
-        return experiment_of(merged, self.models)
+        experiment = experiment_of(merged, self.models)
+        experiment.check_reading()  # otherwise first when the world is opened, by which time others have run
+        return experiment
 
     def responsible(self, places: list[Place], message: str) -> Place | None:
         """The place without which an error goes away; the last of several."""
