@@ -13,7 +13,7 @@ def label_of(source: Any, kind: str) -> str:
 
 
 def content_of(source: Any) -> str:
-    """Digest of a file, of an image database, or of an object in memory."""
+    """Digest of a file and those that it refers to (see `files_of_mesh`), of an image database, or of an object in memory."""
     if not isinstance(source, str | Path):
         import joblib
 
@@ -22,8 +22,15 @@ def content_of(source: Any) -> str:
         from tussock.render.images.folders import digest_of
 
         return digest_of(Path(source))
-    status = Path(source).stat()
-    return _file_digest(Path(source), status.st_size, status.st_mtime_ns)
+    from tussock.world.meshes.references import files_of_mesh
+
+    digests = [_digest_of(path) for path in files_of_mesh(Path(source))]
+    return digests[0] if len(digests) == 1 else hashlib.sha256(" ".join(digests).encode()).hexdigest()
+
+
+def _digest_of(path: Path) -> str:
+    status = path.stat()
+    return _file_digest(path, status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=1024)  # every run of a sweep names the same few files

@@ -161,6 +161,15 @@ class Surroundings:
             changes[outer] = attrs.evolve(changes.get(outer, getattr(self, outer)), **fields)
         return attrs.evolve(self, **changes)
 
+    def check_reading(self) -> None:
+        """Refuse an axis or a unit where the world is not a file. Raises SettingError."""
+        from tussock.world.params import is_generated
+
+        of_file = isinstance(self.world, str) and not is_generated(self.world)
+        if self.reading.changes_coordinates and not of_file:
+            made = "generated" if isinstance(self.world, str) else "in memory"
+            raise SettingError(f"up, unit and scale are for files of meshes, and this world is {made}: leave them out")
+
     def open_world(self) -> "World":
         """The world; that of databases has no triangles.
 
@@ -175,8 +184,7 @@ class Surroundings:
         from tussock.world.params import is_generated
         from tussock.world.scene import World
 
-        if isinstance(self.world, World) and self.reading.changes_coordinates:
-            raise SettingError("up, unit and scale are for files of meshes; this world is in memory: leave them out")
+        self.check_reading()
         seed = self.seed if self.world_seed is None else self.world_seed
         world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
         world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import FieldError
 from tussock.world.settings import MAX_COORDINATE, converted, number, settings, whole
 
 from .mask import Mask, as_mask
@@ -54,16 +54,20 @@ class Eye:
     def __attrs_post_init__(self):
         if self.bottom >= self.top:
             top, bottom = math.degrees(self.top), math.degrees(self.bottom)
-            raise SettingError(f"Eye: bottom is {bottom:g} and top is {top:g} degrees; give bottom < top")
+            raise FieldError("Eye", "bottom", f"is {bottom:g} and top is {top:g} degrees; give bottom < top")
         if self.width * self.height * self.rays**2 > MAX_RAYS:
-            raise SettingError(
-                f"Eye: {self.width} x {self.height} pixels of {self.rays} x {self.rays} rays are more than {MAX_RAYS:,} rays; "
-                f"give fewer pixels or samples"
+            raise FieldError(
+                "Eye",
+                "",
+                f"{self.width} x {self.height} pixels of {self.rays} x {self.rays} rays are more than {MAX_RAYS:,} rays; "
+                f"give fewer pixels or samples",
             )
         if self.masked and not self.visible().any():
-            raise SettingError(
-                f"Eye: nothing is visible of {self.width} x {self.height} pixels in a field of {math.degrees(self.field):g} degrees"
-                f"{' behind this mask' * (self.mask is not None)}; give a wider field, more columns or another mask"
+            raise FieldError(
+                "Eye",
+                "",
+                f"nothing is visible of {self.width} x {self.height} pixels in a field of {math.degrees(self.field):g} degrees"
+                f"{' behind this mask' * (self.mask is not None)}; give a wider field, more columns or another mask",
             )
 
     @property

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tussock.world.errors import FileError, SettingError, first_line
+from tussock.world.errors import FieldError, FileError, first_line
 
 if TYPE_CHECKING:  # the command line reads the defaults of an eye: without numpy, its help appears at once
     import numpy as np
@@ -70,21 +70,25 @@ def as_mask(value: Any, width: int, height: int) -> Mask:
         value = "".join(value)
     if isinstance(value, np.ndarray):
         if value.dtype != bool or value.shape != (height, width):
-            raise SettingError(
-                f"Eye: a mask of shape {value.shape} and type {value.dtype}; give ({height}, {width}) booleans, "
-                "True where a pixel is visible"
+            raise FieldError(
+                "Eye",
+                "",
+                f"a mask of shape {value.shape} and type {value.dtype}; give ({height}, {width}) booleans, "
+                "True where a pixel is visible",
             )
         return Mask.of(value)
     if isinstance(value, str) and FORM.fullmatch(value):
         mask = value if isinstance(value, Mask) else Mask(value)
         if mask.visible().shape != (height, width):
-            raise SettingError(
-                f"Eye: a mask of {mask.partition(':')[0]} pixels for an eye of {width}x{height}; give a picture, or one of this size"
+            raise FieldError(
+                "Eye",
+                "",
+                f"a mask of {mask.partition(':')[0]} pixels for an eye of {width}x{height}; give a picture, or one of this size",
             )
         return mask
     if isinstance(value, str | os.PathLike) and str(value):
         return Mask.of(fitted(read_mask(Path(value)), width, height), str(value))
-    raise SettingError(f"Eye: mask is {value!r}; give a picture's file, ({height}, {width}) booleans or None")
+    raise FieldError("Eye", "mask", f"is {value!r}; give a picture's file, ({height}, {width}) booleans or None")
 
 
 def read_mask(path: Path) -> "Bool[np.ndarray, 'height width']":
@@ -141,15 +145,15 @@ def _unpacked(text: str) -> "Bool[np.ndarray, 'height width']":
 
     match = FORM.fullmatch(text)
     if match is None:
-        raise SettingError(f"Eye: {text[:40]!r} is not a mask; give a picture's file")
+        raise FieldError("Eye", "", f"{text[:40]!r} is not a mask; give a picture's file")
     width, height = int(match[1]), int(match[2])
     size = -(-width * height // 8)
     try:
         packed = zlib.decompressobj().decompress(base64.urlsafe_b64decode(match[3]), size + 1)
     except (ValueError, zlib.error) as error:
-        raise SettingError(f"Eye: the mask of {width}x{height} pixels is damaged ({first_line(error)})") from error
+        raise FieldError("Eye", "", f"the mask of {width}x{height} pixels is damaged ({first_line(error)})") from error
     if len(packed) != size:
-        raise SettingError(f"Eye: the mask of {width}x{height} pixels is damaged; give a picture's file")
+        raise FieldError("Eye", "", f"the mask of {width}x{height} pixels is damaged; give a picture's file")
     visible = np.unpackbits(np.frombuffer(packed, np.uint8), count=width * height).astype(bool).reshape(height, width)
     visible.setflags(write=False)
     return visible

@@ -391,7 +391,7 @@ BAD = {
     "a scan of 0 degrees": (["evaluate", *SMALL, "--scan-deg", "0"], ["--scan-deg 0", "360"]),
     "no spacing": (["evaluate", *SMALL, "--spacing-m", "0"], ["spacing", "0"]),
     "every 0": (["evaluate", *SMALL, "--every", "0"], ["every", "0"]),
-    "a learning walk of -1 m": (["run", *SMALL, "--learning-walk-m", "-1", "--out", "r"], ["learning_walk", "-1"]),
+    "a learning walk of -1 m": (["run", *SMALL, "--learning-walk-m", "-1", "--out", "r"], ["--learning-walk-m", "-1"]),
     "views that show nothing": (
         ["run", *SMALL, "--encoding", "sky", "--top-deg", "-5", "--out", "r"],
         ["training views shows anything"],
@@ -465,6 +465,40 @@ def test_bad_input_is_one_line_exit_2_and_leaves_nothing(capfd, tmp_path, monkey
     assert lines[0].startswith("tussock: ")
     assert all(word in lines[0] for word in words), lines
     assert files(tmp_path) == before
+
+
+WALK, IMPORTED = ["run", "--world", "tiny"], ["database", "import", "."]
+WRONG_VALUES = {  # how the message begins, and the flags
+    "--headings is 'foo'; give one of auto, ccw": [*WALK, "--headings", "foo"],
+    "--top-deg is 100; give a number from -90 to 90 (degrees)": [*WALK, "--top-deg", "100"],
+    "--bottom-deg is 70 and top is 60 degrees": [*WALK, "--bottom-deg", "70"],
+    "--eye-height-m is inf; give": [*WALK, "--eye-height-m", "inf"],
+    "--size: width is 2; give": [*WALK, "--size", "2x2"],
+    "720 x 150 pixels of 64 x 64 rays are more": [*WALK, "--samples", "64"],
+    "--samples is 0; give a whole number from 1 to 64\n": [*WALK, "--samples", "0"],
+    "--step-m is -1.0; give": [*WALK, "--step-m", "-1"],
+    "--offset-m is nan; give": [*WALK, "--offset-m", "nan"],
+    "--arrive-m is 0.0; give": [*WALK, "--arrive-m", "0"],
+    "--lost-m is 0.0; give": [*WALK, "--lost-m", "0"],
+    "--waypoint-m is 0.0; give": [*WALK, "--waypoint-m", "0"],
+    "--heading-noise-deg is -1; give a number from 0 (degrees)": [*WALK, "--heading-noise-deg", "-1"],
+    "--scan-deg is 900; give a number over 0 to 360 (degrees)": [*WALK, "--scan-deg", "900"],
+    "Scan: width is 9 rad": [*WALK, "--navigator", "scan width=9"],
+    "--every is 0; give": [*WALK, "--every", "0"],
+    "--unit is 'foo'; give one of auto, mm": [*WALK, "--unit", "foo"],
+    "--max-slope-deg is 0; give a number from 1 to 89 (degrees)": ["route", "--max-slope-deg", "0"],
+    "--kind is 'foo'; give one of route, grid\n": [*IMPORTED, "--kind", "foo"],
+    "--format is 'gif'; give one of png, jpg": [*IMPORTED, "--format", "gif"],
+    "--inner-px is -1.0; give": [*IMPORTED, "--inner-px", "-1"],
+    "--lens is 'foo'; give": ["unwrap", "a.png", "--lens", "foo"],
+}
+
+
+@pytest.mark.parametrize("begin", WRONG_VALUES)
+def test_an_invalid_value_is_reported_with_the_flag_that_gave_it(capfd, tmp_path, begin):
+    code, _, err = tussock(capfd, *WRONG_VALUES[begin], "--out", tmp_path / "out.csv")
+    assert code == 2
+    assert err.startswith(f"tussock: {begin}"), err
 
 
 def test_wrong_flags_exit_with_2(capfd):

@@ -273,6 +273,39 @@ def test_the_keys_differ_where_a_setting_differs(tmp_path):
         assert (key_of(elsewhere) == key_of(others["mask"])) == (hidden == 40)
 
 
+MESHES = {  # a file, and those that decide what it looks like
+    "wall.obj": (
+        "mtllib no.mtl \\\n two.mtl\nmtllib my walls.mtl\nv 0 0 0\n",
+        ["two.mtl", "my walls.mtl", "Skin/Bark.PNG"],
+    ),
+    "wall.gltf": (
+        '{"asset": {}, "buffers": [{"uri": "a%20b.bin"}, {"uri": "data:,"}], "images": [{"uri": "Skin\\\\Bark.PNG"}, {}]}',
+        ["a b.bin", "Skin/Bark.PNG"],
+    ),
+    "wall.ply": ("ply\nformat ascii 1.0\ncomment TextureFile skin/bark.png\nend_header\n", ["Skin/Bark.PNG"]),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_the_key_of_a_run_depends_on_the_files_that_its_mesh_needs(name, tmp_path):
+    content, others = MESHES[name]
+    (tmp_path / "Skin").mkdir()
+    contents = {name: content, "my walls.mtl": "newmtl a\n\tmap_Kd\t-clamp on C:\\art\\skin\\bark.png\nmap_Ks no.png\n"}
+    for each in (name, *others, "beside.png"):
+        (tmp_path / each).write_text(contents.get(each, "first"))
+    experiment = experiment_of({"world": str(tmp_path / name)})
+    keys = [key_of(experiment)]
+    for each in (name, *others):
+        (tmp_path / each).write_text(contents.get(each, "other") + " \n")
+        keys.append(key_of(experiment))
+    assert len(set(keys)) == len(keys)
+    (tmp_path / "beside.png").write_text("not used")
+    (tmp_path / "no.png").write_text("not used")
+    assert key_of(experiment) == keys[-1]
+    (tmp_path / "Skin" / "Bark.PNG").unlink()
+    assert key_of(experiment) not in keys
+
+
 @pytest.mark.parametrize("given", [{"field_deg": 296.0}, {"mask": "mask.png"}, {"field_deg": 90.0, "mask": "mask.png"}])
 def test_a_field_and_a_mask_are_settings_of_a_run(given):
     experiment = experiment_of(given)

@@ -15,6 +15,7 @@ from tussock.render.images.writing import Grid, write_database
 from tussock.world.errors import InputError
 from tussock.world.files import read_world, write_world
 from tussock.world.geometry import Bounds
+from tussock.world.meshes.reading import MeshReading
 from tussock.world.scene import World
 from tussock.world.textures import to_display, to_linear
 
@@ -110,12 +111,19 @@ def test_colours_of_vertices_are_display_colours_in_bytes_and_else_linear(read, 
     assert world.rgb.tolist() == [[shown] * 3] * 2
 
 
-def test_colours_of_vertices_times_the_texture_times_the_factor(read):
-    colours = np.full((4, 3), 128, np.uint8)
+@pytest.mark.parametrize(
+    ("kind", "value", "linear"), [("uint8", 128, None), ("uint16", 16384, 16384 / 65535), ("float32", 0.25, 0.25)]
+)
+def test_colours_of_vertices_times_the_texture_times_the_factor(read, kind, value, linear):
+    """In linear light, wherever on the wall; colours in bytes are display colours, others are linear."""
+    colours = np.full((4, 3), value, kind)
     material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1, 1, 1]}}
     world = read(wall_glb(material, image=png(np.full((2, 2, 3), 200)), TEXCOORD_0=UV, COLOR_0=colours))
-    light = to_linear(200 / 255) * to_linear(128 / 255) * np.array([0.5, 1, 1])
-    assert np.abs(np.array(at(world, 0.3, 0.6)[:3]) - 255 * to_display(light)).max() <= 1
+    corner = to_linear(value / 255) if linear is None else linear
+    light = to_linear(200 / 255) * corner * np.array([0.5, 1, 1])
+    for place in ((0.3, 0.6), (-0.8, 0.2)):
+        assert np.abs(np.array(at(world, *place)[:3]) - 255 * to_display(light)).max() <= 1
+    assert np.abs(world.rgb - 255 * to_display(light)).max() <= 1
 
 
 def test_colours_are_interpolated_in_perspective(read):
@@ -334,12 +342,39 @@ def test_colours_of_stl(tmp_path, program):
     assert read_world(tmp_path / "a.stl").rgb.tolist() == [[255, 0, 0], [0, 255, 0], [*own]]
 
 
-def test_faces_without_texture_coordinates_leave_the_others_their_texture(read):
-    obj = "mtllib m.mtl\nusemtl a\nv -1 1 0\nv 1 1 0\nv 1 1 1\nv -1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 1 0\n"
-    obj += "f 1/1/1 2/2/1 3/3/1\nf 1//1 3//1 4//1\nv 0 -1 0\nv 1 -1 0\nv 0 -1 1\nvt 0.5 0.5\nf 5 6 7\nf 5/4 6/4 7/4\n"
+def obj_with_faces_without_texture(first: str, second: str) -> str:
+    """An OBJ of two walls with a material each; the last of three faces of each has no texture coordinates."""
+    obj = f"mtllib m.mtl\nusemtl {first}\nv -1 1 0\nv 1 1 0\nv 1 1 1\nv -1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 1 0\n"
+    obj += f"f 1/1/1 2/2/1 3/3/1\nf 1//1 3//1 4//1\nusemtl {second}\nv 0 -1 0\nv 1 -1 0\nv 0 -1 1\nvt 0.5 0.5\nf 5 6 7\nf 5/4 6/4 7/4\n"
+    return obj
+
+
+def test_faces_without_texture_coordinates_leave_the_others_their_texture(read, caplog):
     image = png(np.full((2, 2, 4), (200, 30, 30, 255), np.uint8))
+    obj = obj_with_faces_without_texture("a", "a")
     world = read(obj, "obj", m_mtl="newmtl a\nKd 1 1 1\nmap_Kd t.png\n", t_png=image)
     assert world.rgb.tolist() == [[200, 30, 30]] * 4
+    (remark,) = [record.getMessage() for record in caplog.records if "vt" in record.getMessage()]
+    assert "2 of the faces with material 'a'" in remark
+
+
+def test_faces_without_texture_coordinates_are_counted_by_their_material(read, tmp_path, caplog):
+    mtl = "newmtl a b\nKd 1 1 1\n map_Kd -s 1 1 1 t.png\nnewmtl plain\nKd 1 0 0\nmap_Ks t.png\nnewmtl lost\nmap_Kd no.png\n"
+    read(obj_with_faces_without_texture("a b", "plain"), "obj", m_mtl=mtl, t_png=png(GREY))
+    (remark,) = [record.getMessage() for record in caplog.records if "vt" in record.getMessage()]
+    assert "1 of the faces with material 'a b'" in remark
+    with pytest.raises(InputError, match=r"'a b'.+--strict"):
+        read_world(tmp_path / "world.obj", MeshReading(strict=True))
+    caplog.clear()
+    read(obj_with_faces_without_texture("plain", "lost"), "obj", m_mtl=mtl, t_png=png(GREY))
+    assert [record.getMessage().count("no.png") for record in caplog.records if "not found" in record.getMessage()] == [
+        1
+    ]
+    assert "vt" not in caplog.text
+    no_coordinates = OBJ.replace("/1", "").replace("/2", "").replace("/3", "").replace("/4", "")
+    world = read(no_coordinates, "obj", world_mtl="newmtl m\nKd 1 0 0\nmap_Kd a.png\n", a_png=png(GREY))
+    assert world.rgb.tolist() == [[255, 0, 0]] * 2
+    assert "2 of the faces with material 'm'" in caplog.text
 
 
 # Written and read again.

@@ -132,6 +132,19 @@ def z_up(vertices: np.ndarray) -> np.ndarray:
 # Axes and units
 
 
+@pytest.mark.parametrize(("along", "thickness"), [("x", 0.0), ("y", 0.0), ("x", 0.01), ("x", 0.1)])
+def test_one_can_stand_before_and_behind_a_flat_wall(tmp_path, caplog, along, thickness):
+    caplog.set_level(logging.INFO)
+    points = np.array([(-1, 0, 0), (1, 0, 0), (1, thickness, 1), (-1, thickness, 1)], dtype=float) + (0, 3, 0)
+    points = points if along == "x" else points[:, [1, 0, 2]]
+    trimesh.Trimesh(points, [(0, 1, 2), (0, 2, 3)], process=False).export(tmp_path / "wall.ply")
+    field = read_world(tmp_path / "wall.ply").field
+    margin = 2.0 if thickness < 0.02 else 0.0
+    expected = (-1, 3 - margin, 1, 3 + thickness + margin)
+    assert np.allclose(field, expected if along == "x" else np.array(expected)[[1, 0, 3, 2]])
+    assert (f"a flat wall along {along}" in caplog.text) == (margin > 0)
+
+
 def test_the_turns_are_rotations_and_undo_each_other():
     points = np.random.default_rng(0).normal(size=(50, 3))
     for up, axis in (("x", 0), ("y", 1), ("z", 2)):

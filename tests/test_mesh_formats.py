@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from tussock.world.meshes.obj import map_options
 from tussock.world.meshes.polygons import triangulated
 from tussock.world.meshes.reading import MeshReading
 from tussock.world.meshes.search import Neighbours
+from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
 RED = (200, 30, 30)
@@ -385,6 +387,55 @@ def test_files_that_are_no_world_are_refused_with_what_they_are(tmp_path, name, 
 def test_a_folder_is_refused(tmp_path):
     with pytest.raises(FileError, match="is a folder"):
         read_world(tmp_path)
+
+
+def planes_file(path, *planes) -> Path:
+    np.array(planes, dtype="<f8").tofile(path)
+    return path
+
+
+SPIRAL = np.linspace(0, 20, 96)
+ROUTES = {  # x, y (cm) and heading (degrees) of routes of which the last numbers may be colours
+    "straight": (np.linspace(100, 800, 96), np.linspace(900, 100, 96), np.zeros(96)),
+    "east": (np.linspace(0, 500, 12), np.full(12, 3.0), np.zeros(12)),
+    "spiral": (30 * SPIRAL * np.cos(SPIRAL), 30 * SPIRAL * np.sin(SPIRAL), np.zeros(96)),
+    "one degree": (np.linspace(100, 800, 96), np.linspace(900, 100, 96), np.ones(96)),
+}
+
+
+@pytest.mark.parametrize("name", ROUTES)
+def test_a_route_whose_headings_are_all_the_same_is_not_a_black_world(tmp_path, name):
+    path = planes_file(tmp_path / "r.bin", *ROUTES[name])
+    with pytest.raises(FileError, match=r"seems to be a route.*--route"):
+        read_world(path)
+    assert np.allclose(read_route(path, "as-is").xy, np.transpose(ROUTES[name][:2]) / 100)
+
+
+@pytest.mark.parametrize("kind", ["few points", "small black triangles", "headings of less than a degree"])
+def test_numbers_that_may_be_a_route_and_a_world_are_read_as_asked_for_with_a_remark(tmp_path, caplog, kind):
+    planes = np.zeros((12, 40))  # small triangles in a row, black, with their last corners on the ground
+    planes[:6] = np.linspace(0, 50, 40) + np.random.default_rng(0).normal(0, 0.1, (6, 40))
+    planes[6:8] = 0.2
+    x, y, _ = ROUTES["straight"]
+    numbers = {
+        "few points": [[0, 100, 200, 250], [0, 0, 50, 100], [0, 0, 0, 0]],
+        "small black triangles": planes.reshape(3, -1),
+        "headings of less than a degree": [x, y, np.linspace(0.1, 0.9, 96)],
+    }[kind]
+    path = planes_file(tmp_path / "r.bin", *numbers)
+    assert len(read_world(path).triangles) == np.size(numbers) // 12
+    assert "read as an AntWorld world" in caplog.text
+    assert "give it with --route" in caplog.text
+    caplog.clear()
+    assert read_route(path, "as-is").xy.shape == (np.size(numbers) // 3, 2)
+    assert "read as an AntWorld route" in caplog.text
+    assert "give it as --world" in caplog.text
+
+
+def test_a_world_of_colours_is_no_route(tmp_path, caplog):
+    planes = np.random.default_rng(0).uniform(0, 1, (12, 2))  # so few numbers that steps say nothing
+    assert len(read_world(planes_file(tmp_path / "w.bin", *planes)).triangles) == 2
+    assert "route" not in caplog.text
 
 
 def test_a_world_and_a_route_are_told_apart_by_their_contents(tmp_path, sussex):

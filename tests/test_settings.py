@@ -1,6 +1,7 @@
 """Fields that check themselves: what they accept is kept, what they do not is refused with its name, value and range."""
 
 import math
+import pickle
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import FieldError, SettingError
 from tussock.world.settings import (
     RGB,
     choice,
@@ -146,6 +147,14 @@ def test_a_field_without_a_default_is_required():
     assert Needs(size=3).size == 3
     with pytest.raises(TypeError, match="size"):
         Needs()
+
+
+def test_an_error_keeps_the_class_and_the_field_wherever_it_is_sent():
+    with pytest.raises(FieldError) as refusal:
+        Body(turn=-7.0)
+    sent = pickle.loads(pickle.dumps(refusal.value))
+    assert (sent.owner, sent.field, str(sent)) == ("Body", "turn", str(refusal.value))
+    assert sent.in_degrees == "is -401.07; give a number from -180 to 180 (degrees) or None"
 
 
 def test_a_class_is_called_by_its_name_where_it_has_one():

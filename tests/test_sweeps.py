@@ -153,7 +153,7 @@ REFUSED: list[tuple[str, int | None, list[str]]] = [  # the text, the line that 
     ("[axes]\nseed = { from = 0, to = 1e9, step = 1e-9 }\n", 2, ["range", "1e-09"]),
     ("[axes]\nseed = { to = 1 }\n", 2, ["range", "from = 0, to = 19"]),
     ("[fixed]\nseed = 3\n[axes]\nseed = [1]\n", 4, ["seed", "fixed", "leave one out"]),
-    ("[fixed]\nscan-deg = 400\n[axes]\nseed = [1]\n", 2, ["width", "400 degrees"]),
+    ("[fixed]\nscan-deg = 400\n[axes]\nseed = [1]\n", 2, ["scan-deg is 400; give", "to 360 (degrees)"]),
     ("[fixed]\non-lost = 'cry'\n[axes]\nseed = [1]\n", 2, ["'cry'", "stop or reset"]),
     ("[fixed]\nworld = 'there-is-none.glb'\n[axes]\nseed = [1]\n", 2, ["there-is-none.glb"]),
     ("[axes]\nworld = ['tiny', 'tiny field_width=900']\n", 2, ["'tiny field_width=900'", "field_width", "900"]),
@@ -166,7 +166,11 @@ REFUSED: list[tuple[str, int | None, list[str]]] = [  # the text, the line that 
     ("[axes]\n" + "".join(f"{name} = {{from=1, to=999}}\n" for name in ("seed", "route-seed", "every")), None, ["997,002,999 runs"]),
     ("[axes]\noffset-m = [0]\noffset_m = [0.1, 0.2]\n", 2, ["offset_m", "twice"]),
     ("[axes]\nrenderer = ['cpu', 'gpu']\n", 2, ["'gpu'", "osmesa"]),
-    ("[axes]\nroute-length-m = [1, 0.05]\n", 2, ["route_length", "0.05"]),
+    ("[axes]\nroute-length-m = [1, 0.05]\n", 2, ["route-length-m is 0.05; give"]),
+    ("[fixed]\nnavigator = 'scan width=9'\n[axes]\nseed = [1]\n", 2, ["Scan: width is 9 rad"]),
+    ("[fixed]\nunit = 'mm'\nworld = 'tiny'\n[axes]\nseed = [1]\n", 2, ["unit", "generated", "leave them out"]),
+    ("[fixed]\nworld = 'w.obj'\nup = 'y'\n[axes]\nscale = [1, 2]\nunit = ['auto', 'cm']\n", 6, ["scale 1", "'cm'", "one of the two"]),
+    ("[fixed]\nworld = 'w.obj'\n[axes]\nup = ['y', 'w']\n", 4, ["up is 'w'; give"]),
     ("[fixed]\nroute = '.'\n[axes]\nseed = [1]\n", 2, ["route"]),
     ("[axes]\nwho = [{model = 'rbm'}, {encoding = 'grey'}]\n", 2, ["who", "the same", "model"]),
     ("[fixed]\nsize = '720x150'\n[axes]\nsamples = [1, 64]\n", 4, ["720 x 150", "64"]),
@@ -176,12 +180,32 @@ REFUSED: list[tuple[str, int | None, list[str]]] = [  # the text, the line that 
 @pytest.mark.parametrize(("text", "line", "words"), REFUSED)
 def test_a_file_that_cannot_be_run_is_refused_with_its_line(text, line, words, tmp_path):
     path = written(tmp_path, text)
+    (tmp_path / "w.obj").write_text("v 0 0 0\n")
     with pytest.raises(InputError) as refused:
         read_sweep(path)
     message = str(refused.value)
     assert message.startswith(str(path) if line is None else f"{path}, line {line}: ")
     assert all(word in message for word in words), message
     assert "\n" not in message
+
+
+def test_a_sweep_reads_the_file_of_a_world_as_it_says(tmp_path):
+    for name, lines in (
+        ("mm.obj", "v 0 0 0\nv 4000 0 0\nv 0 0 -2000\nv 4000 1000 0\n"),
+        ("m.obj", "v 0 0 0\nv 4 0 0\nv 0 2 0\nv 4 0 1\n"),
+    ):
+        (tmp_path / name).write_text(f"{lines}f 1 2 3\nf 1 2 4\n")
+    worlds = (
+        "{world='mm.obj', up='y', unit='mm'}, {world='m.obj', up='z', unit='m'}, {world='m.obj', up='z', unit='cm'}"
+    )
+    sweep = read_sweep(written(tmp_path, f"[axes]\nworld = [{worlds}]\n"))
+    other, same, small = (experiment.open_world().triangles for experiment in sweep.experiments)
+    assert np.allclose(other, same)
+    assert np.allclose(small * 100, same)
+    fixed = "[fixed]\nworld = 'mm.obj'\nup = 'y'\n"
+    scaled = read_sweep(written(tmp_path, f"{fixed}[axes]\nscale = [0.001, 0.0005]\n")).experiments
+    assert np.allclose(scaled[0].open_world().triangles, same)
+    assert np.allclose(scaled[1].open_world().triangles, same / 2)
 
 
 def test_a_sweep_is_all_combinations_of_its_choices(tmp_path):

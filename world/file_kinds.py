@@ -1,5 +1,6 @@
 """What a file is, by its content and its name, before a reader takes it for something else."""
 
+import logging
 import os
 import re
 import struct
@@ -10,6 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from .errors import FileError
+
+log = logging.getLogger(__name__)
 
 HEAD = 4096  # bytes that are looked at
 
@@ -119,7 +122,13 @@ def refuse_other_kinds(path: Path) -> None:
         raise FileError(f"{path} cannot be read as {suffix or 'this kind'}; export it as GLB from {program}")
     if kind is not None and kind.group in REFUSED:
         raise FileError(f"{path} is {REFUSED[kind.group].format(kind.name)}")
-    if suffix == ".csv" or (suffix == ".bin" and path.stat().st_size % 8 == 0 and looks_like_route(numbers_in(path))):
+    numbers = numbers_in(path) if suffix == ".bin" and path.stat().st_size % 8 == 0 else np.empty(0)
+    if looks_like_both(numbers):
+        log.warning(
+            f"{path}: read as an AntWorld world of {len(numbers) // 12} triangles; its numbers may also be a route of "
+            f"{len(numbers) // 3} points: if it is one, give it with --route"
+        )
+    if suffix == ".csv" or looks_like_route(numbers):
         raise FileError(
             f"{path} seems to be a route or a table, not a world; give it with --route, and a mesh as the world"
         )
@@ -129,6 +138,14 @@ def head_of(path: Path) -> bytes:
     """The first bytes of a file."""
     with path.open("rb") as file:
         return file.read(HEAD)
+
+
+def mesh_format(path: Path) -> str:
+    """The format of a mesh, as the suffix of its file; of a GLB or a PLY by its content."""
+    content = kind_of(head_of(path))
+    if content is not None and content.name in ("GLB", "PLY"):
+        return content.name.lower()
+    return path.suffix.lower().lstrip(".")
 
 
 def numbers_in(path: Path) -> Float[np.ndarray, " n"]:
@@ -144,19 +161,12 @@ def is_lfs_pointer(content: bytes) -> bool:
 def looks_like_route(numbers: Float[np.ndarray, " n"]) -> bool:
     """Whether the numbers of a `.bin` that is given as a world are those of an AntWorld route. In doubt they are not.
 
-    A route has x and y (cm) and headings (degrees), one array after the other.
+    A route has x and y (cm) and headings (degrees), one array after the other. Where its headings could also be colours, because all
+    are the same number, a long one is known by its corners: as a world, its triangles are large.
     """
-    if len(numbers) < 6 or len(numbers) % 3:
+    if not _may_be_route(numbers):
         return False
-    colours = numbers.reshape(12, -1)[9:] if len(numbers) % 12 == 0 else None
-    if colours is not None and _are_colours(colours):
-        return False
-    planes = numbers.reshape(3, -1)
-    x, y, heading = planes
-    if not np.isfinite(planes).all() or (np.abs(heading) > 720).any():
-        return False
-    extent, steps = np.ptp(planes[:2], axis=1), np.hypot(np.diff(x), np.diff(y))
-    return bool(extent.any() and (len(steps) < 8 or np.median(steps) < 0.25 * np.hypot(*extent)))
+    return not _may_be_world(numbers) or (_same_headings(numbers) and _is_long(numbers) and not _is_fine(numbers))
 
 
 def looks_like_world(numbers: Float[np.ndarray, " n"]) -> bool:
@@ -164,14 +174,55 @@ def looks_like_world(numbers: Float[np.ndarray, " n"]) -> bool:
 
     A world has small triangles, with colours from 0 to 1 that differ.
     """
-    if not len(numbers) or len(numbers) % 12:
+    return bool(_may_be_world(numbers) and np.ptp(numbers.reshape(12, -1)[9:]) and _is_fine(numbers))
+
+
+def looks_like_both(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether the numbers of a `.bin` may well be those of an AntWorld route, and also those of a world."""
+    if (
+        not (_may_be_route(numbers) and _may_be_world(numbers))
+        or looks_like_route(numbers)
+        or looks_like_world(numbers)
+    ):
         return False
-    planes = numbers.reshape(12, -1)
-    if not np.isfinite(planes).all() or not _are_colours(planes[9:]) or not np.ptp(planes[9:]):
+    return _same_headings(numbers) or _is_long(numbers)
+
+
+def _may_be_route(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether they are points at small steps, with headings."""
+    if len(numbers) < 6 or len(numbers) % 3:
+        return False
+    planes = numbers.reshape(3, -1)
+    x, y, heading = planes
+    if not np.isfinite(planes).all() or (np.abs(heading) > 720).any():
         return False
     with np.errstate(all="ignore"):
-        x, y, z = planes[:9].reshape(3, 3, -1)
-        size = np.median([np.ptp(each, axis=0) for each in (x, y)], axis=1)  # of most triangles
+        extent, steps = np.ptp(planes[:2], axis=1), np.hypot(np.diff(x), np.diff(y))
+        return bool(extent.any() and (not _is_long(numbers) or np.median(steps) < 0.25 * np.hypot(*extent)))
+
+
+def _may_be_world(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether they are triangles with colours."""
+    if not len(numbers) or len(numbers) % 12:
+        return False
+    return bool(np.isfinite(numbers).all() and _are_colours(numbers.reshape(12, -1)[9:]))
+
+
+def _is_long(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether a route of these numbers has enough steps to see that they are small."""
+    return len(numbers) // 3 > 8
+
+
+def _same_headings(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether all headings of a route of these numbers are the same; as a world it is of one colour, with corners at that height."""
+    return not np.ptp(numbers.reshape(3, -1)[2])
+
+
+def _is_fine(numbers: Float[np.ndarray, " n"]) -> bool:
+    """Whether most triangles of a world of these numbers are small."""
+    with np.errstate(all="ignore"):
+        x, y, z = numbers.reshape(12, -1)[:9].reshape(3, 3, -1)
+        size = np.median([np.ptp(each, axis=0) for each in (x, y)], axis=1)
         extent = np.array([np.ptp(x), np.ptp(y)])
         return bool((size <= 0.2 * extent.max()).all() and np.ptp(z) <= 2 * extent.max())
 

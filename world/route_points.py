@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .errors import FileError, SettingError
-from .file_kinds import kind_of, looks_like_world
+from .file_kinds import kind_of, looks_like_both, looks_like_world
 from .route_arrays import read_mat, read_npy, read_npz
 from .route_columns import (
     Column,
@@ -77,7 +77,7 @@ def read_points(path: Path, columns: str | None) -> Points:
     if suffix == ".bin":
         if columns is not None:
             raise SettingError("--columns are for tables and arrays; an AntWorld .bin has none")
-        return _of_planes(data)
+        return _of_planes(path, data)
     _refuse_other_kinds(data)
     if suffix not in TEXT_SUFFIXES and not suffix[1:].isdigit():
         raise FileError(f"unknown kind of route {suffix!r}; give .csv, .txt, .mat, .npy or AntWorld .bin")
@@ -151,7 +151,7 @@ def _of_columns(columns: dict[str, Column], values: Float[np.ndarray, "axes n"])
     )
 
 
-def _of_planes(data: bytes) -> Points:
+def _of_planes(path: Path, data: bytes) -> Points:
     """The points in an AntWorld .bin: x (cm), y (cm) and heading (degrees), one after the other."""
     if len(data) % 24:
         _refuse_other_kinds(data)
@@ -159,6 +159,13 @@ def _of_planes(data: bytes) -> Points:
     planes = np.frombuffer(data, dtype="<f8")
     if looks_like_world(planes):
         raise FileError(WORLD.format("AntWorld .bin"))
+    if looks_like_both(planes):
+        logger.warning(
+            "%s: read as an AntWorld route of %d points; its numbers may also be a world of %d triangles: if it is one, give it as --world",
+            path,
+            len(planes) // 3,
+            len(planes) // 12,
+        )
     x, y, heading = planes.reshape(3, -1)
     with np.errstate(all="ignore"):  # any bytes are numbers
         return Points(np.column_stack([x, y]) / 100, np.radians(heading), planes=True)

@@ -4,7 +4,7 @@
     class Body:
         step_length: float = number(0.05, above=0, unit="m")
 
-An invalid value raises `SettingError` where the settings are made: in a script, by the command line or from a sweep file.
+An invalid value raises `FieldError`, a `SettingError`, where the settings are made: in a script, by the command line or from a sweep file.
 `describe(Body)` gives the default, unit and range of every field.
 
 Why attrs: it checks an object when it is made and when it is changed, accepts arrays and objects of any class as values, and
@@ -18,7 +18,7 @@ from typing import Any, TypeVar, dataclass_transform
 
 import attrs
 
-from .errors import SettingError
+from .errors import FieldError
 
 T = TypeVar("T")
 RGB = tuple[int, int, int]
@@ -90,13 +90,13 @@ def colour(default: RGB) -> Any:
     return _several(default, _Range(int, 0, 255), count=3)
 
 
-def choice(default: str, names: Iterable[str]) -> Any:
-    """A field for one of several texts."""
+def choice(default: str | None, names: Iterable[str], *, optional: bool = False) -> Any:
+    """A field for one of several texts. optional: Whether None is allowed."""
     known = tuple(names)
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
-        if not (isinstance(value, str) and value in known):
-            refuse(instance, attribute, value, f"one of {', '.join(known)}")
+        if not ((optional and value is None) or (isinstance(value, str) and value in known)):
+            refuse(instance, attribute, value, f"one of {', '.join(known)}" + " or None" * optional)
 
     return attrs.field(default=default, validator=check, metadata={"choices": known})
 
@@ -137,17 +137,20 @@ def describe(cls: type) -> dict[str, dict[str, Any]]:
     return {each.name: {"default": each.default} | dict(each.metadata) for each in attrs.fields(cls)}
 
 
-def refuse(instance: Any, attribute: attrs.Attribute, value: Any, wanted: str) -> None:
-    """Raise SettingError for a value.
+def refuse(instance: Any, attribute: attrs.Attribute, value: Any, wanted: str, in_degrees: str = "") -> None:
+    """Raise FieldError for a value.
 
     Args:
         instance: The object that is made; its class is called by its attribute `name` where it has one.
         attribute: The field.
         value: What was given.
         wanted: What to give instead.
+        in_degrees: The same in degrees, of an angle.
     """
     label = getattr(type(instance), "name", "") or type(instance).__name__
-    raise SettingError(f"{label}: {attribute.name} is {shown(value, attribute.metadata)}; give {wanted}")
+    problem = f"is {shown(value, attribute.metadata)}; give {wanted}"
+    angle = in_degrees and isinstance(value, float)
+    raise FieldError(label, attribute.name, problem, f"is {math.degrees(value):g}; give {in_degrees}" if angle else "")
 
 
 def shown(value: Any, metadata: Mapping[str, Any]) -> str:
@@ -188,6 +191,11 @@ class _Range:
         words = ["whole number" if self.kind is int else "number", low, high, f"({self.unit})" if self.unit else ""]
         return " ".join(filter(None, words))
 
+    def in_degrees(self) -> "_Range":
+        """The same angles in degrees."""
+        low, high, above = map(math.degrees, (self.low, self.high, self.above))
+        return attrs.evolve(self, low=low, high=high, above=above, unit="degrees")
+
     @property
     def metadata(self) -> dict[str, Any]:
         """Unit and limits, for `describe`."""
@@ -200,7 +208,8 @@ def _single(default: Any, allowed: _Range, optional: bool, names: Collection[str
 
     def check(instance: Any, attribute: attrs.Attribute, value: Any) -> None:
         if not (value in allowed or (optional and value is None) or (isinstance(value, str) and value in names)):
-            refuse(instance, attribute, value, " or ".join([f"a {allowed}", *others]))
+            in_degrees = " or ".join([f"a {allowed.in_degrees()}", *others]) if allowed.unit == "rad" else ""
+            refuse(instance, attribute, value, " or ".join([f"a {allowed}", *others]), in_degrees)
 
     return attrs.field(default=default, converter=allowed.convert, validator=check, metadata=allowed.metadata)
 

@@ -18,6 +18,7 @@ import tyro
 
 from tussock.world.errors import InputError
 
+from ..setting_names import message_of
 from .terminal import library_messages, message, show
 
 # Where the class of a command is, by its name; or a sentence and the commands that go under one name.
@@ -81,7 +82,7 @@ def main(arguments: list[str] | None = None) -> None:
         if result.get("ok") is False:  # what was to be checked is not as it should be
             sys.exit(1)
     except InputError as error:
-        fail(str(error))
+        fail(message_of(error, [name for name, value in vars(command).items() if value is not None], "--"))
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except RuntimeError as error:

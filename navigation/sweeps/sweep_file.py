@@ -18,6 +18,7 @@ from tussock.world.params import is_generated
 from ..experiment import MODEL_SUFFIX, Experiment
 from ..experiment_settings import TYPES, experiment_of
 from ..models.files import TrainedModel
+from ..setting_names import message_of
 from .spec import Sweep
 
 MAX_RUNS = 1_000_000
@@ -94,18 +95,21 @@ class _Reader:
             try:
                 yield self.experiment(places)
             except InputError as error:
+                text = message_of(error, {key for _, _, choice in places for key in choice})
                 place = self.responsible(places, str(error))
                 if place is None:
-                    raise SettingError(f"{self.path}, run {number} of {count}: {error}") from error
+                    raise SettingError(f"{self.path}, run {number} of {count}: {text}") from error
                 table, name, choice = place
-                raise self.error(table, name, str(error), *choice.values()) from error
+                raise self.error(table, name, text, *choice.values()) from error
 
     def experiment(self, places: list[Place]) -> Experiment:
         """The experiment of settings that stand in several places."""
         merged = dict(ALWAYS)
         for _, _, choice in places:
             merged |= choice
-        return experiment_of(merged, self.models)
+        experiment = experiment_of(merged, self.models)
+        experiment.check_reading()  # otherwise first when the world is opened, by which time others have run
+        return experiment
 
     def responsible(self, places: list[Place], message: str) -> Place | None:
         """The place without which an error goes away; the last of several."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import FieldError
 from tussock.world.settings import choice, number, settings, switch, whole
 
 from .calibration import read_calibration
@@ -59,12 +59,14 @@ class Camera:
 
     def __attrs_post_init__(self):
         if self.lens in ("fisheye", "omnidirectional") and self.calibration is None:
-            raise SettingError(
-                f"Camera: a {self.lens} lens needs a calibration; give the file of OpenCV's with K and D"
+            raise FieldError(
+                "Camera", "", f"a {self.lens} lens needs a calibration; give the file of OpenCV's with K and D"
             )
         if self.calibration is not None and self.lens not in ("fisheye", "omnidirectional"):
-            raise SettingError(
-                f"Camera: a calibration is of a fisheye or omnidirectional lens, not of {self.lens!r}; give that lens"
+            raise FieldError(
+                "Camera",
+                "",
+                f"a calibration is of a fisheye or omnidirectional lens, not of {self.lens!r}; give that lens",
             )
 
     def unwrapping(self, pictures: Sequence[Picture]) -> Unwrapping:

@@ -54,7 +54,7 @@ class ImportSettings:
         quality: Of JPEG images.
     """
 
-    kind: str | None = attrs.field(default=None, validator=attrs.validators.optional(attrs.validators.in_(KINDS)))
+    kind: str | None = choice(None, KINDS, optional=True)
     columns: str | None = text(None, optional=True)
     unit: str | None = text(None, optional=True)
     headings: str = choice("auto", HEADINGS)

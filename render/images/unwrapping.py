@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import FieldError, SettingError
 from tussock.world.geometry import column_azimuths
 from tussock.world.settings import choice, number, numbers, settings, switch, whole
 
@@ -54,10 +54,12 @@ class Ring:
 
     def __attrs_post_init__(self):
         if len(self.centre) != 2 or self.outer - self.inner < 1 or self.top <= self.bottom:
-            raise SettingError(
-                f"Ring: centre {self.centre}, inner radius {self.inner:g}, outer radius {self.outer:g}, "
+            raise FieldError(
+                "Ring",
+                "",
+                f"centre {self.centre}, inner radius {self.inner:g}, outer radius {self.outer:g}, "
                 f"{math.degrees(self.bottom):g} to {math.degrees(self.top):g} degrees; "
-                "give x and y, an outer radius that is larger by at least a pixel, and bottom < top"
+                "give x and y, an outer radius that is larger by at least a pixel, and bottom < top",
             )
 
     @property

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from ..errors import FileError, InputError, first_line
-from ..file_kinds import MAKE_A_MESH, head_of, kind_of
+from ..file_kinds import MAKE_A_MESH, mesh_format
 from ..geometry import Bounds
 from ..origin import origin_of, shown
 from ..scene import World
@@ -29,6 +29,8 @@ from .upright import only_stands_with_z_up
 log = logging.getLogger(__name__)
 
 MAX_TRIANGLES = 10**7  # of a world; each takes a few hundred bytes while it is read
+FLAT = 0.01  # of its width: a thinner mesh is a wall
+MAX_MARGIN = 10.0  # m, of the field around a wall
 ARCHIVES = ("zip", "bz2", "gz")  # trimesh would unpack them, whatever the size of their content
 GLTF = ("glb", "gltf")
 
@@ -103,10 +105,7 @@ def _stands_with_z_up(path: Path, meshes: list, reading: MeshReading) -> bool:
 
 def _kind(path: Path, known: set[str]) -> str:
     """What trimesh calls the format of a file. Raises FileError for an unknown one."""
-    content = kind_of(head_of(path))
-    if content is not None and content.name in ("GLB", "PLY"):
-        return content.name.lower()
-    kind = path.suffix.lower().lstrip(".")
+    kind = mesh_format(path)
     if kind not in known or kind in ARCHIVES:
         raise FileError(
             f"unknown kind of world {path.suffix!r}; give .glb, .gltf, .ply, .obj, .stl, .off or AntWorld .bin"
@@ -131,7 +130,8 @@ def _prepared(path: Path, kind: str) -> MeshFile:
         data, remarks = prepared_gltf(path, search)
         return MeshFile("glb", data, search, float32=True, remarks=remarks)
     if kind == "obj":
-        return MeshFile(kind, prepared_obj(path, search), search, unit=stated_unit(path))
+        data, remarks = prepared_obj(path, search)
+        return MeshFile(kind, data, search, remarks=remarks, unit=stated_unit(path))
     if kind == "ply":
         data, header = prepared_ply(path)
         return MeshFile(kind, data, search, own=header.comment(KEY), float32=header.stores_float32())
@@ -193,14 +193,28 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
     rgb, texturing = appearance_of(meshes, path, file.search.get)
     own = _own_data(path, file.own, triangles) if file.own is not None else None
     if own is None:
-        corners_xy = triangles.reshape(-1, 3)[:, :2].astype(float)
         own = {
             "ground": None,
             "sky_rgb": DEFAULT_SKY,
-            "field": Bounds(*corners_xy.min(axis=0).tolist(), *corners_xy.max(axis=0).tolist()),
+            "field": _field(path, triangles),
             "origin_m": origin,
         }
     return World(triangles=triangles, rgb=rgb, texturing=texturing, **own)
+
+
+def _field(path: Path, triangles: np.ndarray) -> Bounds:
+    """Where an agent may be: the extent of the mesh; of a flat wall, in which nobody can stand, also what lies before and behind it."""
+    xy = triangles.reshape(-1, 3)[:, :2].astype(float)
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    width = float((high - low).max())
+    flat = high - low < FLAT * width
+    if flat.any():
+        margin = np.where(flat, min(width, MAX_MARGIN), 0.0)
+        low, high = low - margin, high + margin
+        log.info(
+            f"{path}: it is a flat wall along {'yx'[int(flat.argmax())]}, so agents may be up to {margin.max():g} m from it"
+        )
+    return Bounds(*low.tolist(), *high.tolist())
 
 
 def _say_far(path: Path, origin: tuple[float, float, float], step: float) -> None:

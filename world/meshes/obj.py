@@ -1,6 +1,7 @@
 """OBJ and MTL files before trimesh reads them: what people write and trimesh misreads is written as it reads it."""
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,14 +30,15 @@ UNIT_NAMES = {
     for name in names.split()
 }
 USED_MAPS = ("map_kd", "map_d")
+FACES_WITHOUT_TEXTURE = re.compile(r"\nf(?: +\d+(?://\d+)?)+ *(?=\n)")  # none of their corners has a place in a texture
 
 
-def prepared_obj(path: Path, search: Neighbours) -> bytes:
+def prepared_obj(path: Path, search: Neighbours) -> tuple[bytes, list[str]]:
     """The file as trimesh reads it: plain lines, absolute indices, and one material file with plain names.
 
-    What it names and is not found is entered in `search.missing`.
+    What it names and is not found is entered in `search.missing`. Also gives remarks about what is not read.
     """
-    text = _decoded(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
+    text = decoded(path.read_bytes()).replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
     text = f"\n{text}\n"
     text = re.sub(r"\n[ \t]+", "\n", text) if "\n " in text or "\n\t" in text else text
     if "\t" in text:
@@ -50,16 +52,20 @@ def prepared_obj(path: Path, search: Neighbours) -> bytes:
         raise FileError(f"it holds no triangles, only {content}; export it with surfaces as polygons")
     if re.search(r"\nf[^\n]*-", text):
         text = "\n".join(_with_absolute_indices(text.split("\n")))
-    if re.search(r"\nf +\d+/\d", text) and re.search(r"\nf +\d+(?://\d+)? ", text):
-        text = _with_texture_coordinates(text)
-    if re.search(r"\nf(?: +\S+){5}", text):
-        text = _without_polygons(text)
     libraries = [name.strip() for name in re.findall(r"\nmtllib +([^\n]*)", text)]
     if libraries:
         text = f"\nmtllib {LIBRARY}" + re.sub(r"\nmtllib [^\n]*", "", text)
     used = {name.strip() for name in re.findall(r"\nusemtl +([^\n]*)", text)}
-    search.texts[LIBRARY] = _materials(libraries, used, search).encode()
-    return text.encode()
+    materials = _materials(libraries, used, search)
+    search.texts[LIBRARY] = materials.encode()
+    remarks = []
+    if FACES_WITHOUT_TEXTURE.search(text):
+        remarks = _remarks_on_faces(text, materials)
+        if re.search(r"\nf +\d+/\d", text):
+            text = _with_texture_coordinates(text)
+    if re.search(r"\nf(?: +\S+){5}", text):
+        text = _without_polygons(text)
+    return text.encode(), remarks
 
 
 def stated_unit(path: Path) -> str | None:
@@ -70,7 +76,7 @@ def stated_unit(path: Path) -> str | None:
     return UNIT_NAMES.get(stated[1].lower()) if stated else None
 
 
-def _decoded(data: bytes) -> str:
+def decoded(data: bytes) -> str:
     """The text in a file: UTF-8, UTF-16 with a mark, or Latin-1."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace").lstrip("\ufeff")
@@ -100,9 +106,28 @@ def _with_absolute_indices(lines: list[str]) -> Iterator[str]:
 def _with_texture_coordinates(text: str) -> str:
     """The text, with the place 0 0 in the texture for faces that have none: trimesh drops the texture of all faces otherwise."""
     number = len(re.findall(r"\nvt ", text)) + 1
-    faces = re.compile(r"\nf(?: +\d+(?://\d+)?)+ *(?=\n)")
-    text = faces.sub(lambda face: re.sub(r" (\d+)(?:/(/\d+))?", rf" \1/{number}\2", face[0]), text)
+    corner = re.compile(r" (\d+)(?:/(/\d+))?")
+    text = FACES_WITHOUT_TEXTURE.sub(lambda face: corner.sub(rf" \1/{number}\2", face[0]), text)
     return f"{text}vt 0 0\n"
+
+
+def _remarks_on_faces(text: str, materials: str) -> list[str]:
+    """How many faces of which material have a texture and no place in it."""
+    textured = {
+        block.partition("\n")[0]
+        for block in f"\n{materials}".split("\nnewmtl ")[1:]
+        if any(line.lower().startswith(tuple(f"{key} " for key in USED_MAPS)) for line in block.split("\n"))
+    }
+    counts: Counter[str] = Counter()
+    for block in text.split("\nusemtl ")[1:]:
+        name, _, lines = block.partition("\n")
+        if name.strip() in textured:
+            counts[name.strip()] += len(FACES_WITHOUT_TEXTURE.findall(f"\n{lines}\n"))
+    return [
+        f"has no texture coordinates (vt) for {count:,} of the faces with material {name!r}, so each of these is drawn in one colour"
+        for name, count in counts.items()
+        if count
+    ]
 
 
 def _without_polygons(text: str) -> str:
@@ -130,7 +155,7 @@ def _materials(libraries: list[str], used: set[str], search: Neighbours) -> str:
             if path is None:
                 search.missing[name], complete = "is not found next to the file", False
             else:
-                lines += _material_lines(_decoded(path.read_bytes()), search)
+                lines += _material_lines(decoded(path.read_bytes()), search)
     known = {line.split(" ", 1)[1] for line in lines if line.startswith("newmtl ")}
     if complete:
         where = "is in none of its material files" if libraries else "is in no material file: it names none (mtllib)"
