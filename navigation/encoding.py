@@ -22,6 +22,7 @@ from tussock.world.specs import signature_of
 from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views, Visible
 from .feature_mask import FeatureMask
+from .overlap import remark_on_overlap
 
 STEPS = Registry(
     "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
@@ -214,6 +215,12 @@ class EyeEncoding:
         for image, each in zip(images, [self.known] * len(views) if known is None else known, strict=True):
             image[torch.from_numpy(~self.encoding.visible(each))] = torch.nan
         return images
+
+    def remark_on_overlap(self) -> None:
+        """Log at how many rotations two images show too little of the same to be compared, if there are any."""
+        if self.known is not None and self.mask is not None:
+            shown = self.encoding.visible(self.known)
+            remark_on_overlap(shown & self.mask.visible.numpy(), shown)
 
     def seen(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
         """Feature images as the eye sees them at its present heading, 0 where it sees nothing: not to be turned (`FeatureMask.images`)."""

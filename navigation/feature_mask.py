@@ -36,7 +36,7 @@ class FeatureMask:
         visible: (h, w)
         normalised: What is visible is shifted to mean 0 and scaled to unit variance (without contrast it becomes 0).
         gain: By which it is multiplied then.
-        partial: Pixels of views may be unknown, which are nan. Then views are normalised where they are compared (models/overlap.py).
+        partial: Pixels of views may be unknown, which are nan. Then views are normalised where they are compared (overlap.py).
     """
 
     visible: Bool[torch.Tensor, "h w"]
@@ -131,9 +131,14 @@ def energies(views: Float[torch.Tensor, "n h w"], mask: FeatureMask | None) -> F
     return views.square().sum(dim=(1, 2))[:, None] if mask is None else mask.energies(views)
 
 
+def is_partial(mask: FeatureMask | None) -> bool:
+    """Whether pixels of views may be unknown."""
+    return mask is not None and mask.partial
+
+
 def check_takes_partial(model: object, mask: FeatureMask | None) -> None:
     """Refuse a model that cannot compare views of which parts are unknown. Raises SettingError."""
-    if mask is not None and mask.partial and not getattr(model, "takes_partial", False):
+    if is_partial(mask) and not getattr(model, "takes_partial", False):
         raise SettingError(
             f"{getattr(model, 'name', type(model).__name__)} needs to know all of an image, and parts of these show nothing of the world; "
             "give perfect-memory, which compares what two images both show"

@@ -131,6 +131,7 @@ def training_views(
     """
     images, kept, source = [], [], training_source(renderer)
     encoded = encoding.for_eye(renderer.eye)
+    encoded.remark_on_overlap()
     for start in range(0, len(poses), BATCH):
         part = poses[start : start + BATCH]
         batch = encoded.at(source, part)

@@ -14,7 +14,7 @@ from tussock.world.errors import SettingError
 from tussock.world.settings import instance_of, whole
 from tussock.world.specs import format_spec, own_parameters
 
-from ..feature_mask import WITH_MASK, FeatureMask, check_takes_partial
+from ..feature_mask import WITH_MASK, FeatureMask, check_takes_partial, is_partial
 from .checks import MAX_COLUMNS, MAX_VALUE, Images, all_bounded, check_device, check_scan, check_training
 from .filter_bank import FilterBank
 from .registry import MODELS
@@ -140,9 +140,7 @@ class Model(ABC):
         return format_spec(MODELS.name_of(type(self)), changed)
 
     def see(self: Self, mask: FeatureMask | None) -> Self:
-        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Views are of the full circle all the same, and turn
-        behind it. Raises SettingError after training, and for a class that does not mind masks.
-        """
+        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Raises SettingError later, and where that is not minded."""
         if self.shape is not None and mask != self.mask:
             raise SettingError(f"{self.name} has learned through another mask; make a new model")
         if mask is not None and not self.takes_mask:
@@ -154,7 +152,7 @@ class Model(ABC):
     def fit(self: Self, views: Images) -> Self:
         """Learn the views, forgetting earlier ones. Raises SettingError for no views and for values that are not finite."""
         check_device(self.device)
-        check_training(views, self.partial)
+        check_training(views, is_partial(self.mask))
         if self.mask is not None:
             self.mask.check(views.shape[1:])
         views = self._on_device(views)
@@ -170,7 +168,7 @@ class Model(ABC):
         Raises:
             SettingError: Before `fit`, and for views of another shape than the learned ones.
         """
-        check_scan(views, self.shape, self.partial)
+        check_scan(views, self.shape, is_partial(self.mask))
         if len(views) == 0:
             return torch.empty(0, views.shape[2])
         scans = torch.cat([self._scan(self._on_device(batch)) for batch in in_batches(views)])
@@ -201,11 +199,6 @@ class Model(ABC):
         vars(self).update(vars(restored))
 
     @property
-    def partial(self) -> bool:
-        """Whether pixels of views may be unknown."""
-        return self.mask is not None and self.mask.partial
-
-    @property
     def memory_bytes(self) -> int:
         """Size of what it has learned."""
         return sum(tensor.nbytes for tensor in self.learned.values())
@@ -232,7 +225,7 @@ class Model(ABC):
                 raise SettingError(f"{self.name}: {key} has shape {tuple(tensor.shape)}, not {expected[key]}")
             if (dtype := self.dtypes.get(key, torch.float32)) not in (None, tensor.dtype):
                 raise SettingError(f"{self.name}: {key} has type {tensor.dtype}, not {dtype}")
-            if tensor.is_floating_point() and not all_bounded(tensor, self.partial):
+            if tensor.is_floating_point() and not all_bounded(tensor, is_partial(self.mask)):
                 raise SettingError(
                     f"{self.name}: the {key} are not finite, or over {MAX_VALUE:g}; if they grew without bound, give a lower rate"
                 )
@@ -289,8 +282,8 @@ class IncrementalModel(Model):
         """Learn further views of the same shape on top of what it knows; where that fails, the model stays as it was."""
         if self.shape is None:
             return self.fit(views)
-        check_training(views, self.partial)
-        check_scan(views, self.shape, self.partial)
+        check_training(views, is_partial(self.mask))
+        check_scan(views, self.shape, is_partial(self.mask))
         self.restore(self.shape, self._add(self.learned, self._on_device(views)))  # type: ignore[attr-defined]
         return self
 

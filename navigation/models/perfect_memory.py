@@ -7,11 +7,11 @@ from jaxtyping import Float32, Int64
 from tussock.render.compile import compiled
 from tussock.world.errors import SettingError
 
-from ..feature_mask import energies
+from ..feature_mask import energies, is_partial
+from ..overlap import BLOCK, overlaps
 from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
 from .checks import check_scan
 from .filter_bank import FILTERS, NearestFilters
-from .overlap import BLOCK, overlaps
 from .rotations import in_batches
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
@@ -42,7 +42,7 @@ class PerfectMemory(IncrementalModel):
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
-        check_scan(views, self.shape, self.partial)
+        check_scan(views, self.shape, is_partial(self.mask))
         if len(views) == 0:
             return self.scan(views), torch.empty(0, views.shape[2], dtype=torch.int64)
         familiarity, index = zip(*(self._nearest(self._on_device(batch)) for batch in in_batches(views)), strict=True)

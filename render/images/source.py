@@ -214,8 +214,8 @@ def _check_mask(database: Database, eye: Eye) -> None:
     visible = eye.mask.visible()
     if (visible != visible[:, :1]).any():
         raise FileError(
-            f"{database.folder}: a mask hides what is there, and these images may not show it; make a database with "
-            "tussock database import --mask, which keeps what the images do not show"
+            f"{database.folder}: its mask hides parts that are not the same all around, and what is behind them is not known; make a "
+            "database of it with tussock database import --mask, which keeps what images do not show"
         )
 
 

@@ -15,16 +15,24 @@ This is BoB robotics' perfect memory with masks (each image has one, and a view'
 rotations at once. What an eye hides at each heading (`FeatureMask.visible`) is 0 in M alone.
 """
 
+import logging
 from collections.abc import Iterator
+from functools import cache
 
+import numpy as np
 import torch
-from jaxtyping import Float32, Float64
+from jaxtyping import Bool, Float32, Float64
 
-from ..feature_mask import MIN_DEVIATION, FeatureMask
+from .feature_mask import MIN_DEVIATION, FeatureMask
+
+log = logging.getLogger(__name__)
 
 BLOCK = 128  # memories compared at once; what is held on the way is then some 100 MB
-# Share of what a memory shows below which a rotation is not compared: chance makes small overlaps alike. See docs/images-only.md.
-MIN_OVERLAP = 0.5
+# Share of what a memory shows below which a rotation is not compared: chance makes small overlaps alike. Measured with a camera of 180
+# degrees and two encodings in five worlds, the mean error of headings is 93 degrees with 0.05, 56 with 0.2, 48 with 0.4 and 53 with 0.5.
+MIN_OVERLAP = 0.4
+
+Visible = Bool[np.ndarray, "h w"]
 
 
 class Overlap:
@@ -81,6 +89,28 @@ class Overlap:
 def overlaps(memories: Float32[torch.Tensor, "m h w"], mask: FeatureMask) -> Iterator[Overlap]:
     """Memories in blocks that can be compared at once."""
     return (Overlap(block, mask) for block in memories.split(BLOCK))
+
+
+def remark_on_overlap(memory: Visible, view: Visible) -> None:
+    """Log at how many rotations images are not compared, of which one is a memory.
+
+    Args:
+        memory: (h, w) What is seen and known of it.
+        view: (h, w) What is known of the other.
+    """
+    count = np.fft.irfft((np.fft.rfft(view).conj() * np.fft.rfft(memory)).sum(axis=0), n=memory.shape[1]).round()
+    if excluded := int((count < MIN_OVERLAP * memory.sum()).sum()):
+        _remark(excluded, memory.shape[1])
+
+
+@cache  # once, however many models learn
+def _remark(excluded: int, width: int) -> None:
+    log.warning(
+        "images do not show all around: at %d of %d rotations, two share less than %.0f %% of what one shows and are not compared",
+        excluded,
+        width,
+        100 * MIN_OVERLAP,
+    )
 
 
 def _scale(variance: Float64[torch.Tensor, "n w m"]) -> Float64[torch.Tensor, "n w m"]:
