@@ -140,7 +140,7 @@ class Model(ABC):
         return format_spec(MODELS.name_of(type(self)), changed)
 
     def see(self: Self, mask: FeatureMask | None) -> Self:
-        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Raises SettingError later, and where that is not minded."""
+        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Raises SettingError later, and where it is not minded."""
         if self.shape is not None and mask != self.mask:
             raise SettingError(f"{self.name} has learned through another mask; make a new model")
         if mask is not None and not self.takes_mask:
