@@ -47,13 +47,16 @@ class Overlap:
         self._mask, self._width = mask, memories.shape[2]
         hidden = ~mask.visible.to(memories.device)
         known, values = self._parts(memories.masked_fill(hidden, torch.nan))
-        self._sizes = known.sum(dim=(1, 2))
+        self._sizes = known.sum(dim=(1, 2)).clamp(min=1)
         self._spectra = [
             torch.fft.rfft(each).permute(2, 1, 0) for each in (known, values, values.square())
         ]  # (f, h, m)
 
     def squared(self, views: Float32[torch.Tensor, "n h w"]) -> Float64[torch.Tensor, "n w m"]:
-        """Mean square difference from each memory at each rotation; inf where less than MIN_OVERLAP of the memory overlaps."""
+        """Mean square difference from each memory at each rotation.
+
+        It is inf where less than MIN_OVERLAP of the memory overlaps, and, of what is normalised, where neither has contrast there.
+        """
         known, values = self._parts(views)
         of_known, of_values, of_squares = (
             torch.fft.rfft(each).permute(2, 0, 1).conj() for each in (known, values, values.square())
@@ -71,7 +74,9 @@ class Overlap:
             scale_memory = _scale(squared_memory - mean_memory.square())
             scale_view = _scale(squared_view - mean_view.square())
             correlation = (product - mean_memory * mean_view) * scale_memory * scale_view
-            difference = (scale_memory > 0).double() + (scale_view > 0).double() - 2 * correlation
+            contrasts = (scale_memory > 0).double() + (scale_view > 0).double()
+            difference = contrasts - 2 * correlation
+            compared &= contrasts > 0
         return (self._mask.gain**2 * difference).clamp(min=0).where(compared, torch.inf)
 
     def _parts(self, images: Float32[torch.Tensor, "n h w"]) -> tuple[torch.Tensor, torch.Tensor]:

@@ -100,6 +100,7 @@ def precision_recall(
         possible: Number of queries that can be recognised.
     """
     order = difference.argsort(kind="stable")
-    last = np.r_[np.flatnonzero(np.diff(difference[order])), len(order) - 1]  # equal differences are accepted together
+    ordered = difference[order]
+    last = np.r_[np.flatnonzero(ordered[1:] != ordered[:-1]), len(order) - 1]  # equal differences are accepted together
     right = correct[order].cumsum()[last]
     return right / (last + 1), right / possible
