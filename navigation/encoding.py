@@ -9,16 +9,20 @@ from typing import Any
 import attrs
 import numpy as np
 import torch
-from jaxtyping import Float32
+from jaxtyping import Bool, Float32
 
 from tussock.render.eye import Eye
+from tussock.render.images.source import DatabaseViews
+from tussock.render.poses import Poses
+from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.registry import Registry
 from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
-from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views
+from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views, Visible
 from .feature_mask import FeatureMask
+from .overlap import remark_on_overlap
 
 STEPS = Registry(
     "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
@@ -81,8 +85,11 @@ class Encoding:
 
     def for_eye(self, eye: Eye) -> "EyeEncoding":
         """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
-        visible = eye.visible() if eye.masked else np.ones((1, 1), dtype=bool)
-        if visible.all():
+        visible, known = (
+            eye.visible() if eye.masked or eye.known is not None else np.ones((1, 1), dtype=bool),
+            eye.known,
+        )
+        if visible.all() and known is None:
             return EyeEncoding(self, None)
         at = next((place for place, step in enumerate(self.steps) if isinstance(step, Normalise)), len(self.steps))
         local, rest = self.steps[:at], self.steps[at + 1 :]
@@ -92,20 +99,27 @@ class Encoding:
                     f"encoding {str(self)!r}: with a field or mask, normalise takes what is visible at each heading, so it stands last, "
                     f"or before scale only; put {label(step)} before it"
                 )
-        for step in local:
+        chain = attrs.evolve(self, steps=local)
+        visible = chain.visible(visible)
+        if not visible.any() or (known is not None and not chain.visible(known.visible()).any()):
+            raise SettingError(
+                f"encoding {str(self)!r} leaves no pixel that is made of visible ones alone; give less blur or resize, or a wider field"
+            )
+        gain = float(np.prod([step.factor for step in rest if isinstance(step, Scale)]))
+        partial = known is not None
+        mask = FeatureMask(torch.from_numpy(visible), normalised=at < len(self.steps), gain=gain, partial=partial)
+        return EyeEncoding(chain, mask, known.visible() if partial else None)
+
+    def visible(self, mask: Visible) -> Visible:
+        """Which pixels of a feature image are made of visible ones (height, width) alone. Raises SettingError where that is not known."""
+        for step in self.steps:
             check = getattr(step, "visible", None)
             if check is None:
                 raise SettingError(
                     f"encoding {str(self)!r}: {label(step)} lacks visible(mask), which a field or mask needs"
                 )
-            visible = check(visible)
-        if not visible.any():
-            raise SettingError(
-                f"encoding {str(self)!r} leaves no pixel that is made of visible ones alone; give less blur or resize, or a wider field"
-            )
-        gain = float(np.prod([step.factor for step in rest if isinstance(step, Scale)]))
-        mask = FeatureMask(torch.from_numpy(visible), normalised=at < len(self.steps), gain=gain)
-        return EyeEncoding(attrs.evolve(self, steps=local), mask)
+            mask = check(mask)
+        return mask
 
     def __str__(self) -> str:
         return self._text(STEPS.name_of)
@@ -169,23 +183,47 @@ class EyeEncoding:
     Attributes:
         encoding: What is made of the full circle.
         mask: What of it the model sees; None where nothing is hidden.
+        known: (height, width) What an image shows of the world, as it was recorded; None where that is all of it.
     """
 
     encoding: Encoding
     mask: FeatureMask | None
+    known: Visible | None = attrs.field(default=None, eq=attrs.cmp_using(eq=np.array_equal))
 
-    def __call__(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
-        """Feature images of the full circle."""
+    def at(self, renderer: Renderer, poses: Poses) -> Float32[torch.Tensor, "n h w"]:
+        """Feature images of what a renderer, or image databases, show at poses."""
+        return self(renderer.render(poses), renderer.known(poses) if isinstance(renderer, DatabaseViews) else None)
+
+    def __call__(
+        self, views: Views, known: Bool[np.ndarray, "n height width"] | None = None
+    ) -> Float32[torch.Tensor, "n h w"]:
+        """Feature images of the full circle, nan where they are not made of what is known.
+
+        Args:
+            views: (n, height, width, 3 or 4)
+            known: What each view shows of the world; None: as it was recorded.
+        """
         estimates = views.shape[-1] == 3 and isinstance(self.encoding.steps[0], ForegroundMask)
         if self.mask is not None and estimates:
             raise SettingError(
                 "foreground-mask estimates the sky from the whole view, hidden parts too; with a field or mask give views with alpha, or "
                 "take grey"
             )
-        return self.encoding(views)
+        images = self.encoding(views)
+        if self.known is None:
+            return images
+        for image, each in zip(images, [self.known] * len(views) if known is None else known, strict=True):
+            image[torch.from_numpy(~self.encoding.visible(each))] = torch.nan
+        return images
+
+    def remark_on_overlap(self) -> None:
+        """Log at how many rotations two images show too little of the same to be compared, if there are any."""
+        if self.known is not None and self.mask is not None:
+            shown = self.encoding.visible(self.known)
+            remark_on_overlap(shown & self.mask.visible.numpy(), shown)
 
     def seen(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
-        """Feature images as the eye sees them at its present heading, 0 where it sees nothing: not to be turned."""
+        """Feature images as the eye sees them at its present heading, 0 where it sees nothing: not to be turned (`FeatureMask.images`)."""
         images = self(views)
         return images if self.mask is None else self.mask.images(images)
 

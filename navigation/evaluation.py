@@ -97,7 +97,7 @@ def encoded_views(
     """The encoded views at poses, in batches; of the full circle, whatever the eye sees of it (see `Encoding.for_eye`)."""
     encoded = encoding.for_eye(renderer.eye)
     for start in range(0, len(poses), BATCH):
-        yield encoded(renderer.render(poses[start : start + BATCH]))
+        yield encoded.at(renderer, poses[start : start + BATCH])
 
 
 def recovered_headings(

@@ -128,7 +128,7 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
-            if self.eye.masked and not takes(self.navigator.target, "model"):
+            if (self.eye.masked or self.eye.known is not None) and not takes(self.navigator.target, "model"):
                 raise SettingError(f"the navigator {str(self.navigator)!r} takes no model; give no field and no mask")
         elif not takes(self.navigator.target, "model"):
             raise SettingError(

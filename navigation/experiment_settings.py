@@ -230,7 +230,7 @@ def _eye(
     size = given.get("size") or (f"{known.width}x{known.height}" if known is not None else None)
     pixels = {} if size is None else dict(zip(("width", "height"), width_and_height(size), strict=True))
     names = {"samples": "samples", "z": "eye_height_m", "top": "top_deg", "bottom": "bottom_deg"}
-    fields = pixels if known is None else pixels | {"field": known.field, "mask": known.mask}
+    fields = pixels if known is None else pixels | {"field": known.field, "mask": known.mask, "known": known.known}
     fields |= _values(given, **names, field="field_deg", mask="mask")
     if route_database is None:
         eye = Eye(**fields)

@@ -153,7 +153,8 @@ class Diagnostics:
             if step.view is None:
                 return None
             memory, poses = self._memory
-            _, index = memory.match(encoding.for_eye(self._renderer.eye)(step.view[None]))
+            known = self._renderer.known([step.pose]) if isinstance(self._renderer, DatabaseViews) else None
+            _, index = memory.match(encoding.for_eye(self._renderer.eye)(step.view[None], known))
             width = index.shape[1]
             match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
         return float(np.hypot(*(poses[match, :2] - step.pose[:2])))

@@ -6,6 +6,9 @@ filter. Sums over what is visible, at all rotations, are the responses of M itse
 deviation are those of the visible pixels at each rotation: (M F) . (roll(v, k) - mean[k]) / deviation[k].
 
 Blanking pixels of v instead is wrong: the blank turns with the view (docs/eyes.md).
+
+What a recorded image does not show is another thing: it is not known, at any rotation, and does turn with the view. Such pixels of
+feature images are nan, and a mask says so beforehand (`partial`).
 """
 
 from collections.abc import Sequence
@@ -33,11 +36,13 @@ class FeatureMask:
         visible: (h, w)
         normalised: What is visible is shifted to mean 0 and scaled to unit variance (without contrast it becomes 0).
         gain: By which it is multiplied then.
+        partial: Pixels of views may be unknown, which are nan. Then views are normalised where they are compared (overlap.py).
     """
 
     visible: Bool[torch.Tensor, "h w"]
     normalised: bool = False
     gain: float = 1.0
+    partial: bool = False
 
     def __attrs_post_init__(self):
         if not self.visible.any():
@@ -46,7 +51,7 @@ class FeatureMask:
     def __eq__(self, other: object) -> bool:
         return (
             isinstance(other, FeatureMask)
-            and (self.normalised, self.gain) == (other.normalised, other.gain)
+            and (self.normalised, self.gain, self.partial) == (other.normalised, other.gain, other.partial)
             and torch.equal(self.visible, other.visible)
         )
 
@@ -81,7 +86,9 @@ class FeatureMask:
         return (self.gain * pixels).float()
 
     def images(self, views: Images) -> Images:
-        """The same as images, 0 where nothing is visible."""
+        """The same as images, 0 where nothing is visible. Partial ones as they are, nan where nothing is visible or known."""
+        if self.partial:
+            return views.masked_fill(~self.visible.to(views.device), torch.nan)
         return self.spread(self.pixels(views))
 
     def select(self, images: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "n visible"]:
@@ -124,8 +131,23 @@ def energies(views: Float[torch.Tensor, "n h w"], mask: FeatureMask | None) -> F
     return views.square().sum(dim=(1, 2))[:, None] if mask is None else mask.energies(views)
 
 
+def is_partial(mask: FeatureMask | None) -> bool:
+    """Whether pixels of views may be unknown."""
+    return mask is not None and mask.partial
+
+
+def check_takes_partial(model: object, mask: FeatureMask | None) -> None:
+    """Refuse a model that cannot compare views of which parts are unknown. Raises SettingError."""
+    if is_partial(mask) and not getattr(model, "takes_partial", False):
+        raise SettingError(
+            f"{getattr(model, 'name', type(model).__name__)} needs to know all of an image, and parts of these show nothing of the world; "
+            "give perfect-memory, which compares what two images both show"
+        )
+
+
 def seeing(model: T, mask: FeatureMask | None) -> T:
     """Any untrained model, told what the eye sees. Raises SettingError where it does not mind that."""
+    check_takes_partial(model, mask)
     see = getattr(model, "see", None)
     if see is not None:
         see(mask)

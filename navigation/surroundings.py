@@ -130,6 +130,10 @@ class Surroundings:
         if self.route_database is not None or self.grid_database is not None:
             self._check_databases()
             return
+        if self.eye.known is not None:
+            raise SettingError(
+                "an eye's known pixels are of recorded images, and a world is drawn all around; give mask instead"
+            )
         if isinstance(self.world, str):
             from tussock.world.files import check_world
 

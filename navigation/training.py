@@ -14,8 +14,8 @@ from tussock.world.geometry import Bounds, Route, wrap_angle
 from tussock.world.progress import Progress, no_progress
 
 from .encoding import Encoding
-from .feature_mask import seeing
-from .models.base import FamiliarityModel
+from .feature_mask import FeatureMask, seeing
+from .models.base import FamiliarityModel, Images
 from .models.files import TrainedModel
 
 log = logging.getLogger(__name__)
@@ -131,11 +131,11 @@ def training_views(
     """
     images, kept, source = [], [], training_source(renderer)
     encoded = encoding.for_eye(renderer.eye)
+    encoded.remark_on_overlap()
     for start in range(0, len(poses), BATCH):
         part = poses[start : start + BATCH]
-        batch = encoded(source.render(part))
-        pixels = batch.flatten(start_dim=1) if encoded.mask is None else encoded.mask.pixels(batch)
-        worth = pixels.std(dim=1, correction=0) > MIN_CONTRAST
+        batch = encoded.at(source, part)
+        worth = _contrast(batch, encoded.mask) > MIN_CONTRAST
         images.append(batch[worth])
         kept.append(part[worth.numpy()])
         progress(min(start + BATCH, len(poses)), len(poses))
@@ -144,6 +144,16 @@ def training_views(
             f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})"
         )
     return torch.cat(images), np.concatenate(kept)
+
+
+def _contrast(images: Images, mask: FeatureMask | None) -> Float32[torch.Tensor, " n"]:
+    """Standard deviation of what a model sees of feature images."""
+    if mask is None or not mask.partial:
+        pixels = images.flatten(start_dim=1) if mask is None else mask.pixels(images)
+        return pixels.std(dim=1, correction=0)
+    pixels = mask.select(images)
+    centred = pixels - pixels.nanmean(dim=1, keepdim=True)
+    return centred.square().nanmean(dim=1).sqrt().nan_to_num(0.0)  # 0 where nothing is known
 
 
 def train(

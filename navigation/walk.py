@@ -149,7 +149,8 @@ class Walk:
         """What the agents whose walk goes on perceive."""
         poses = np.array([agent.pose for agent in self.walking])
         self._views = self.renderer.render(poses)
-        return Look(views=self.encoding(self._views), compass=poses[:, 2])
+        known = self.renderer.known(poses) if isinstance(self.renderer, DatabaseViews) else None
+        return Look(views=self.encoding(self._views, known), compass=poses[:, 2])
 
     def move(self, motion: Motion) -> list[Step | None]:
         """Let the agents whose walk goes on move, and measure where they come to; a row of the motion for each of them."""

@@ -27,7 +27,7 @@ class Eye:
     """A panoramic eye. The default is that of the published Sussex databases.
 
     Renderers draw the full circle. `field` and `mask` say what of it the eye sees (`visible`): they stand still with the eye while
-    it turns (docs/eyes.md).
+    it turns. `known` is of recorded images, and says what of them shows the world: it turns with the image (docs/eyes.md).
 
     Attributes:
         width: Columns, which cover 360 degrees.
@@ -40,6 +40,8 @@ class Eye:
         field: Horizontal field of view, centred ahead (rad). A column counts as visible where all of it lies inside.
         mask: Which pixels are visible: a (height, width) bool array, or the file of a picture that is white where the eye sees and
             black where it does not. None means all. It is kept as a `Mask`, which holds the pixels, not the file.
+        known: Which pixels of a recorded image show the world, given as `mask` is: not those behind the body of the robot, or beyond
+            the field of its camera. None means all.
     """
 
     width: int = whole(720, low=4, high=32768, unit="pixels")
@@ -50,6 +52,7 @@ class Eye:
     samples: int | None = whole(None, low=1, high=64, optional=True)
     field: float = number(2 * math.pi, above=0, high=2 * math.pi, unit="rad")
     mask: Mask | None = converted(default=None, converter=_mask, takes_self=True)
+    known: Mask | None = converted(default=None, converter=_mask, takes_self=True)
 
     def __attrs_post_init__(self):
         if self.bottom >= self.top:
@@ -61,6 +64,10 @@ class Eye:
                 "",
                 f"{self.width} x {self.height} pixels of {self.rays} x {self.rays} rays are more than {MAX_RAYS:,} rays; "
                 f"give fewer pixels or samples",
+            )
+        if self.known is not None and not self.known.visible().any():
+            raise SettingError(
+                "Eye: known is black everywhere; give a picture that is white where images show the world"
             )
         if self.masked and not self.visible().any():
             raise FieldError(
@@ -99,7 +106,8 @@ class Eye:
     def plain(self) -> dict[str, Any]:
         """Its fields by name, for files: numbers and texts. Where all is visible, nothing is said of that, as in earlier files."""
         fields = attrs.asdict(self)
-        return {name: value for name, value in fields.items() if name not in ("field", "mask") or self.masked}
+        said = {"field": self.masked, "mask": self.masked, "known": self.known is not None}
+        return {name: value for name, value in fields.items() if said.get(name, True)}
 
     def elevations(self, rays: int = 1) -> 'Float[np.ndarray, " height_rays"]':
         """Elevations of evenly spaced rows of rays (rad), from top to bottom, `rays` of them in each row of pixels."""

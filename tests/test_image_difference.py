@@ -17,10 +17,9 @@ from tussock.navigation.measures.image_difference import (
     rotational,
     spread,
     translational,
-    valley,
-    valley_of_rotations,
 )
 from tussock.navigation.measures.place_recognition import recognise
+from tussock.navigation.measures.valley import valley, valley_of_rotations
 from tussock.navigation.models import PerfectMemory
 from tussock.render.eye import Eye
 from tussock.render.images import Grid, write_database

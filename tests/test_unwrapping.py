@@ -1,8 +1,10 @@
 """Raw pictures of panoramic lenses become the panoramas that they were made of; lenses agree with OpenCV; rings are found."""
 
 import json
+import math
 import re
 
+import attrs
 import cv2
 import numpy as np
 import pytest
@@ -10,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tussock.navigation.cli.main import main
+from tussock.render.eye import Eye
 from tussock.render.images.calibration import read_calibration
 from tussock.render.images.camera import Camera
 from tussock.render.images.pictures import read_image
 from tussock.render.images.ring_search import find_ring
-from tussock.render.images.unwrapping import Fisheye, Omnidirectional, Panorama, Ring, Unwrapping
+from tussock.render.images.unwrapping import Fisheye, Omnidirectional, Panorama, PanoramaPart, Ring, Unwrapping
 from tussock.world.errors import FileError, InputError, SettingError
 
 TOP, BOTTOM = np.radians(40), np.radians(-20)
@@ -416,3 +419,24 @@ def test_invalid_rings_are_refused():
             Ring(**({"centre": (0.0, 0.0)} | values))
     with pytest.raises(InputError, match="panorama"):
         Unwrapping(RING, 10**5, 10**5, TOP, BOTTOM)
+
+
+def test_a_part_of_a_panorama_is_put_where_it_is_and_the_rest_is_unknown():
+    whole = np.random.default_rng(0).integers(0, 256, (10, 48, 3), dtype=np.uint8)
+    camera = Camera(lens="panorama", top=1.0, bottom=-0.2, field=math.pi)
+    unwrapping = camera.unwrapping([whole[:, 12:36]])
+    assert (unwrapping.width, unwrapping.height) == (48, 10)
+    seen = unwrapping.seen(10, 24)
+    assert np.array_equal(seen, Eye(width=48, height=10, field=math.pi).visible())
+    assert np.array_equal(unwrapping(whole[:, 12:36]), whole * seen[..., None])
+    # Half a column of the field's 25 is outside on either side: it is not known.
+    partly = Unwrapping(
+        PanoramaPart(width=25, height=10, top=1.0, bottom=-0.2, field=math.radians(187.5)), 48, 10, 1.0, -0.2
+    )
+    assert np.array_equal(partly.seen(10, 25), seen)
+    left = attrs.evolve(camera, offset=-math.pi / 2).unwrapping(
+        [whole[:, 12:36]]
+    )  # ahead is a quarter turn left of the middle
+    assert np.array_equal(left.seen(10, 24), np.roll(seen, 12, axis=1))
+    with pytest.raises(SettingError, match="part of a panorama"):
+        Camera(lens="ring", field=math.pi)

@@ -147,7 +147,7 @@ class CatchmentCommand(ModelOptions):
         if not isinstance(references, Pose):
             return experiment.train(renderer, experiment.open_route(renderer.world)).model.model
         model = experiment.make_model()
-        model.fit(experiment.encoding.for_eye(experiment.eye)(renderer.render(np.array([references]))))
+        model.fit(experiment.encoding.for_eye(experiment.eye).at(renderer, np.array([references])))
         return model
 
 

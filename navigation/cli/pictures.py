@@ -48,6 +48,8 @@ class CameraOptions(Command):
     """Elevation of the panorama's upper edge. Default: 60."""
     bottom_deg: float | None = None
     """Elevation of its lower edge. Default: -15."""
+    field_deg: float | None = None
+    """Horizontal field of pictures whose columns are a part of a panorama, about ahead. Default: 360. The rest is unknown."""
     every: int | None = None
     """Every N-th picture, row or frame."""
     format: str = "png"
@@ -76,6 +78,7 @@ class CameraOptions(Command):
             bottom=bottom,
             width=width,
             height=height,
+            field=None if self.field_deg is None else math.radians(self.field_deg),
         )
 
 

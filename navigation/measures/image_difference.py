@@ -1,12 +1,11 @@
 """How much views differ when the eye turns, or stands elsewhere: image difference functions (Zeil, Hofmann and Chahl 2003).
 
 The difference of two encoded views is the root mean square difference of their pixels. Over all rotations of one view it is the
-*rotational* image difference function; over displacements of the eye at one heading, the *translational* one. Of both:
+*rotational* image difference function; over displacements of the eye at one heading, the *translational* one. Of both, the
+minimum is measured (`Valley`).
 
-- minimum: the least difference.
-- depth: the greatest difference minus the least.
-- width: the width of the valley around the minimum at half its depth, interpolated between neighbours. None where the curve does not
-  rise so far on both sides.
+An eye with a field or a mask sees a part of each turned view, and of recorded images a part may be unknown: then the difference is that
+over what is seen of both (`Overlap`). Rotations at which too little is are not compared.
 """
 
 from collections.abc import Sequence
@@ -16,7 +15,6 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32
 
-from tussock.render.eye import Eye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
@@ -25,8 +23,12 @@ from tussock.world.progress import Progress, no_progress
 
 from ..encoding import Encoding
 from ..evaluation import encoded_views
+from ..feature_mask import FeatureMask
+from ..models.rotations import in_batches
+from ..overlap import overlaps
 from ..scan import best_turn
 from ..training import training_source, training_views
+from .valley import Valley, greatest, valley, valley_of_rotations
 
 BATCH = 64  # views compared at once
 SIDES = {
@@ -36,28 +38,14 @@ SIDES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Valley:
-    """The minimum of an image difference function.
-
-    Attributes:
-        minimum: The least difference.
-        depth: The greatest difference minus the least.
-        width: At half the depth (rad of a rotation, m of a displacement); None where it does not rise so far.
-    """
-
-    minimum: float
-    depth: float
-    width: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
 class Rotational:
     """The rotational image difference functions at one displacement.
 
     Attributes:
         displacement: From the reference (m), as asked for.
         distance: Mean distance from the reference at which the views were taken (m); of an image database, that of the nearest ones.
-        curve: (w,) Mean difference at each rotation of the views, turned left by 0, 1, .. columns from the reference's heading.
+        curve: (w,) Mean difference at each rotation of the views, turned left by 0, 1, .. columns from the reference's heading; nan where
+            none is compared.
         valleys: The minimum of each view.
         errors: (n,) Turn to the minimum of each view (rad, -pi..pi).
     """
@@ -85,9 +73,19 @@ class Translational:
 
 
 def differences(
-    views: Float32[torch.Tensor, "n h w"], references: Float32[torch.Tensor, "m h w"]
+    views: Float32[torch.Tensor, "n h w"], references: Float32[torch.Tensor, "m h w"], mask: FeatureMask | None = None
 ) -> Float[np.ndarray, "n m w"]:
-    """The root mean square difference of all views at all rotations, turned left by 0, 1, .. columns, from all references."""
+    """The root mean square difference of all views at all rotations, turned left by 0, 1, .. columns, from all references.
+
+    Args:
+        views: As an `EyeEncoding` makes them.
+        references: Likewise.
+        mask: Of this encoding. What shows too little of a reference at a rotation differs by inf.
+    """
+    if mask is not None:
+        blocks = list(overlaps(references, mask))
+        squares = [torch.cat([each.squared(batch) for each in blocks], dim=2) for batch in in_batches(views)]
+        return torch.cat(squares).sqrt().transpose(1, 2).numpy()
     level = float(references.mean(dtype=torch.float64))  # which changes no difference, and rounding is least around 0
     of_views, of_references = (images.double().numpy() - level for images in (views, references))
     width, pixels = views.shape[2], views.shape[1] * views.shape[2]
@@ -101,14 +99,6 @@ def differences(
         squared = squared - 2 * np.fft.irfft(products, n=width)
         rows.append(np.sqrt(squared.clip(0) / pixels))
     return np.concatenate(rows)
-
-
-def check_sees_all(eye: Eye) -> None:
-    """Refuse an eye that does not see all around. Raises SettingError."""
-    if eye.masked:
-        raise SettingError(
-            "image differences compare whole views, and this eye has a field of view or a mask; leave --field-deg and --mask out"
-        )
 
 
 def differences_of_places(
@@ -127,17 +117,18 @@ def differences_of_places(
         renderer: Draws the views; of image databases, references are images of the route.
         queries: Poses of the query views.
         references: Poses of the reference views.
-        aligned: Compare them at one compass heading; else at the rotation at which they differ least.
+        aligned: Compare them at one compass heading, where they differ by inf if too little of both is seen there; else at the
+            rotation at which they differ least.
         progress: Called with how many queries are compared, of how many.
 
     Returns:
         The differences, and the poses of the references that show anything (see `training_views`).
     """
-    check_sees_all(renderer.eye)
+    mask = encoding.for_eye(renderer.eye).mask
     views, kept = training_views(encoding, renderer, references)
     rows, done = [], 0
     for batch in encoded_views(encoding, renderer, queries):
-        scans = differences(batch, views)
+        scans = differences(batch, views, mask)
         if aligned:
             turns = kept[:, 2] - queries[done : done + len(batch), None, 2]
             columns = np.rint(columns_of_turn(turns, scans.shape[2])).astype(int) % scans.shape[2]
@@ -195,8 +186,9 @@ def rotational(
     Raises:
         SettingError: Where no displaced view can be seen.
     """
-    check_sees_all(renderer.eye)
-    wanted = encoding(training_source(renderer).render(references))
+    encoded = encoding.for_eye(renderer.eye)
+    encoded.remark_on_overlap()
+    wanted = encoded.at(training_source(renderer), references)
     results = []
     for displacement in displacements:
         sides = (0.0,) if displacement == 0 else (displacement, -displacement)
@@ -205,9 +197,9 @@ def rotational(
             at, usable, images = references, np.ones(len(references), dtype=bool), wanted
             if displacement:
                 at, usable = viewpoints(renderer, displaced(references, 0.0, side))
-                images = encoding(renderer.render(at))
+                images = encoded.at(renderer, at)
             for k in np.flatnonzero(usable).tolist():
-                curves.append(differences(images[k : k + 1], wanted[k : k + 1])[0, 0])
+                curves.append(differences(images[k : k + 1], wanted[k : k + 1], encoded.mask)[0, 0])
                 distances.append(float(np.hypot(*(at[k] - references[k])[:2])))
         if not curves:
             raise SettingError(f"no reference has a view {displacement:g} m beside it; give smaller displacements")
@@ -215,9 +207,9 @@ def rotational(
             Rotational(
                 displacement=displacement,
                 distance=float(np.mean(distances)),
-                curve=np.mean(curves, axis=0),
+                curve=np.ma.masked_invalid(curves).mean(axis=0).filled(np.nan),
                 valleys=[valley_of_rotations(curve) for curve in curves],
-                errors=best_turn(-np.array(curves)),
+                errors=best_turn(-np.minimum(curves, [[greatest(curve)] for curve in curves])),
             )
         )
     return results
@@ -235,8 +227,8 @@ def translational(
         reach: Displacement to both sides (m).
         steps: Number of displaced positions on each side.
     """
-    check_sees_all(renderer.eye)
-    wanted = encoding(training_source(renderer).render(references))
+    encoded = encoding.for_eye(renderer.eye)
+    wanted = encoded.at(training_source(renderer), references)
     results = {}
     for name, (forward, left) in SIDES.items():
         distances, curve = [], []
@@ -246,38 +238,22 @@ def translational(
                 distances.append(0.0)
                 curve.append(0.0)
             elif usable.any():
-                images = encoding(renderer.render(at[usable]))
-                squares = (images - wanted[torch.from_numpy(usable)]).square().mean(dim=(1, 2)).sqrt()
-                distances.append(float(np.sign(offset) * np.hypot(*(at - references)[usable, :2].T).mean()))
-                curve.append(float(squares.mean()))
+                off = _unturned(encoded.at(renderer, at[usable]), wanted[torch.from_numpy(usable)], encoded.mask)
+                if (compared := off.isfinite()).any():
+                    away = np.hypot(*(at - references)[usable, :2].T)[compared.numpy()]
+                    distances.append(float(np.sign(offset) * away.mean()))
+                    curve.append(float(off[compared].mean()))
         order = np.argsort(distances, kind="stable")
         x, y = np.array(distances)[order], np.array(curve)[order]
         results[name] = Translational(distances=x, curve=y, valley=valley(x, y))
     return results
 
 
-def valley_of_rotations(curve: Float[np.ndarray, " w"]) -> Valley:
-    """The minimum of a rotational image difference function; its width in rad."""
-    width = len(curve)
-    around = np.roll(curve, width // 2 - int(curve.argmin()))  # the minimum in the middle
-    return valley(np.arange(width) * 2 * np.pi / width, around)
-
-
-def valley(x: Float[np.ndarray, " n"], curve: Float[np.ndarray, " n"]) -> Valley:
-    """The minimum of a curve over ascending positions."""
-    least, most = int(curve.argmin()), float(curve.max())
-    minimum = float(curve[least])
-    half = (minimum + most) / 2
-    left = _crossing(x[: least + 1][::-1], curve[: least + 1][::-1], half)
-    right = _crossing(x[least:], curve[least:], half)
-    width = None if left is None or right is None else right - left
-    return Valley(minimum=minimum, depth=most - minimum, width=width)
-
-
-def _crossing(x: Float[np.ndarray, " n"], curve: Float[np.ndarray, " n"], level: float) -> float | None:
-    """Where a curve first rises to a level, from its first value on; None where it stays below."""
-    above = np.flatnonzero(curve >= level)
-    if len(above) == 0 or above[0] == 0:
-        return None
-    k = int(above[0])
-    return float(x[k - 1] + (level - curve[k - 1]) / (curve[k] - curve[k - 1]) * (x[k] - x[k - 1]))
+def _unturned(
+    views: Float32[torch.Tensor, "n h w"], references: Float32[torch.Tensor, "n h w"], mask: FeatureMask | None
+) -> Float[torch.Tensor, " n"]:
+    """The difference of each view from its own reference, without turning it."""
+    if mask is None:
+        return (views - references).square().mean(dim=(1, 2)).sqrt()
+    pairs = zip(views[:, None], references[:, None], strict=True)
+    return torch.tensor([differences(view, reference, mask)[0, 0, 0] for view, reference in pairs])

@@ -57,7 +57,7 @@ def recognise(
     """Match queries with references, and count what is right.
 
     Args:
-        difference: Image difference of each query from each reference.
+        difference: Image difference of each query from each reference; inf where they are not compared, which is no match.
         queries: Where the query views were taken (m).
         references: Where the reference views were taken (m).
         tolerance: Greatest distance of a correct match (m).
@@ -74,7 +74,7 @@ def recognise(
     if not recognisable.any():
         raise SettingError(f"no query has a reference within {tolerance:g} m; give a greater --tolerance-m")
     order = difference.argsort(axis=1, kind="stable")
-    hits = np.take_along_axis(near, order, axis=1)
+    hits = np.take_along_axis(near & np.isfinite(difference), order, axis=1)
     rows, matches = np.arange(len(queries)), order[:, 0]
     precision, recall = precision_recall(difference[rows, matches], hits[:, 0], int(recognisable.sum()))
     return PlaceRecognition(
@@ -100,6 +100,7 @@ def precision_recall(
         possible: Number of queries that can be recognised.
     """
     order = difference.argsort(kind="stable")
-    last = np.r_[np.flatnonzero(np.diff(difference[order])), len(order) - 1]  # equal differences are accepted together
+    ordered = difference[order]
+    last = np.r_[np.flatnonzero(ordered[1:] != ordered[:-1]), len(order) - 1]  # equal differences are accepted together
     right = correct[order].cumsum()[last]
     return right / (last + 1), right / possible

@@ -14,7 +14,7 @@ from tussock.world.errors import SettingError
 from tussock.world.settings import instance_of, whole
 from tussock.world.specs import format_spec, own_parameters
 
-from ..feature_mask import WITH_MASK, FeatureMask
+from ..feature_mask import WITH_MASK, FeatureMask, check_takes_partial, is_partial
 from .checks import MAX_COLUMNS, MAX_VALUE, Images, all_bounded, check_device, check_scan, check_training
 from .filter_bank import FilterBank
 from .registry import MODELS
@@ -114,6 +114,7 @@ class Model(ABC):
         renamed: Former names of parameters, which specs and files may still use, with the present ones.
         dtypes: Of learned tensors that are not float32; None means any.
         takes_mask: Whether the class minds `mask`, as those of tussock do.
+        takes_partial: Whether views may be unknown in part (`FeatureMask.partial`): nan in views, and in what is learned.
     """
 
     name = "model"
@@ -121,6 +122,7 @@ class Model(ABC):
     renamed: ClassVar[Mapping[str, str]] = {}
     dtypes: ClassVar[Mapping[str, torch.dtype | None]] = {}
     takes_mask: ClassVar[bool] = False
+    takes_partial: ClassVar[bool] = False
 
     device: str = instance_of(str, "cpu", "the name of a device")
     seed: int = whole(0, low=0)
@@ -138,20 +140,19 @@ class Model(ABC):
         return format_spec(MODELS.name_of(type(self)), changed)
 
     def see(self: Self, mask: FeatureMask | None) -> Self:
-        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Views are of the full circle all the same, and turn
-        behind it. Raises SettingError after training, and for a class that does not mind masks.
-        """
+        """Say, before training, what the eye sees: `Encoding.for_eye(eye).mask`. Raises SettingError later, and where it is not minded."""
         if self.shape is not None and mask != self.mask:
             raise SettingError(f"{self.name} has learned through another mask; make a new model")
         if mask is not None and not self.takes_mask:
             raise SettingError(f"{self.name} does not mind what the eye cannot see; {WITH_MASK}")
+        check_takes_partial(self, mask)
         self.mask = mask
         return self
 
     def fit(self: Self, views: Images) -> Self:
         """Learn the views, forgetting earlier ones. Raises SettingError for no views and for values that are not finite."""
         check_device(self.device)
-        check_training(views)
+        check_training(views, is_partial(self.mask))
         if self.mask is not None:
             self.mask.check(views.shape[1:])
         views = self._on_device(views)
@@ -167,7 +168,7 @@ class Model(ABC):
         Raises:
             SettingError: Before `fit`, and for views of another shape than the learned ones.
         """
-        check_scan(views, self.shape)
+        check_scan(views, self.shape, is_partial(self.mask))
         if len(views) == 0:
             return torch.empty(0, views.shape[2])
         scans = torch.cat([self._scan(self._on_device(batch)) for batch in in_batches(views)])
@@ -224,7 +225,7 @@ class Model(ABC):
                 raise SettingError(f"{self.name}: {key} has shape {tuple(tensor.shape)}, not {expected[key]}")
             if (dtype := self.dtypes.get(key, torch.float32)) not in (None, tensor.dtype):
                 raise SettingError(f"{self.name}: {key} has type {tensor.dtype}, not {dtype}")
-            if tensor.is_floating_point() and not all_bounded(tensor):
+            if tensor.is_floating_point() and not all_bounded(tensor, is_partial(self.mask)):
                 raise SettingError(
                     f"{self.name}: the {key} are not finite, or over {MAX_VALUE:g}; if they grew without bound, give a lower rate"
                 )
@@ -281,8 +282,8 @@ class IncrementalModel(Model):
         """Learn further views of the same shape on top of what it knows; where that fails, the model stays as it was."""
         if self.shape is None:
             return self.fit(views)
-        check_training(views)
-        check_scan(views, self.shape)
+        check_training(views, is_partial(self.mask))
+        check_scan(views, self.shape, is_partial(self.mask))
         self.restore(self.shape, self._add(self.learned, self._on_device(views)))  # type: ignore[attr-defined]
         return self
 

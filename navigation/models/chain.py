@@ -30,6 +30,7 @@ class Chain(PerfectMemory):
 
     name = "chain"
     paper = "Cartwright and Collett 1983; the thesis, section 3.2"
+    takes_partial = False
     renamed = {"strange": "max_mismatch"}  # noqa: RUF012
 
     window: float = number(0.05, low=0.001, high=1)

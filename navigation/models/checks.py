@@ -20,18 +20,20 @@ def check_device(device: str) -> None:
         raise SettingError(f"device {device!r} cannot be used here ({first_line(error)}); give cpu") from error
 
 
-def check_training(views: Images) -> None:
-    """Refuse views that no model can learn. Raises SettingError."""
+def check_training(views: Images, partial: bool = False) -> None:
+    """Refuse views that no model can learn; see `check_values`. Raises SettingError."""
     if views.ndim != 3 or len(views) == 0:
         raise SettingError(f"a model learns from at least one view (n, h, w), got shape {tuple(views.shape)}")
     if views.shape[1] < 1 or not MIN_COLUMNS <= views.shape[2] <= MAX_COLUMNS:
         raise SettingError(
             f"views of {views.shape[2]} x {views.shape[1]} pixels; give {MIN_COLUMNS} to {MAX_COLUMNS} columns and at least one row"
         )
-    check_values(views)
+    check_values(views, partial)
+    if partial and bool(views.isnan().flatten(start_dim=1).all(dim=1).any()):
+        raise SettingError("a view shows nothing that is known; leave it out")
 
 
-def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
+def check_scan(views: Images, shape: tuple[int, ...] | None, partial: bool = False) -> None:
     """Refuse views that a model trained on images of `shape` (None: not trained) cannot scan. Raises SettingError."""
     if shape is None:
         raise SettingError("this model has learned nothing yet; call fit(views) first")
@@ -39,21 +41,27 @@ def check_scan(views: Images, shape: tuple[int, ...] | None) -> None:
         raise SettingError(
             f"this model learned views of shape {tuple(shape)}, got {tuple(views.shape[1:])}; encode both in the same way"
         )
-    check_values(views)
+    check_values(views, partial)
 
 
-def check_values(views: Images) -> None:
-    """Refuse views that are not float32, and values that are not finite or over MAX_VALUE. Raises SettingError."""
+def check_values(views: Images, partial: bool = False) -> None:
+    """Refuse views that are not float32, and values that are not finite or over MAX_VALUE. Raises SettingError.
+
+    Args:
+        views: (n, h, w)
+        partial: Whether values may be nan, which are unknown.
+    """
     if views.dtype != torch.float32:
         raise SettingError(f"views are float32, got {views.dtype}; give views.float()")
-    if not all_bounded(views):
+    if not all_bounded(views, partial):
         bad = int((views.abs() <= MAX_VALUE).flatten(start_dim=1).all(dim=1).int().argmin())
         raise SettingError(f"view {bad} holds values that are not finite, or over {MAX_VALUE:g}; check the encoding")
 
 
-def all_bounded(tensor: torch.Tensor) -> bool:
-    """Whether all values are finite and within MAX_VALUE."""
+def all_bounded(tensor: torch.Tensor, partial: bool = False) -> bool:
+    """Whether all values are finite and within MAX_VALUE; of partial tensors, those that are not nan."""
     if tensor.numel() == 0:
         return True
+    tensor = tensor.nan_to_num(posinf=torch.inf, neginf=-torch.inf) if partial else tensor
     least, greatest = tensor.aminmax()
     return float(least) >= -MAX_VALUE and float(greatest) <= MAX_VALUE  # both are nan if a value is

@@ -107,7 +107,9 @@ def save_model(trained: TrainedModel, path: str | os.PathLike) -> None:
     }
     tensors = {f"learned.{key}": tensor.detach().cpu().contiguous() for key, tensor in model.learned.items()}
     if (mask := model.mask) is not None:
-        header["mask"] = {"normalised": mask.normalised, "gain": mask.gain}
+        header["mask"] = {"normalised": mask.normalised, "gain": mask.gain} | (
+            {"partial": True} if mask.partial else {}
+        )
         tensors[VISIBLE] = mask.visible.contiguous()
     if trained.poses is not None:
         tensors["poses"] = torch.tensor(trained.poses)

@@ -5,8 +5,10 @@ import torch
 from jaxtyping import Float32, Int64
 
 from tussock.render.compile import compiled
+from tussock.world.errors import SettingError
 
-from ..feature_mask import energies
+from ..feature_mask import energies, is_partial
+from ..overlap import BLOCK, overlaps
 from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
 from .checks import check_scan
 from .filter_bank import FILTERS, NearestFilters
@@ -23,11 +25,15 @@ class PerfectMemory(IncrementalModel):
     Equation 1 of the thesis (section 4.3), exactly: the distance |v - s|^2 = |v|^2 - 2 v . s + |s|^2 needs one correlation, and where
     rounding could change which rotation is the best, it is computed again directly. With a mask it is that of the visible pixels, in
     float64. Memory grows with the number of views.
+
+    Where parts of images are unknown, the difference is that over what both show (see `Overlap`). Rotations that share too little of
+    it with every snapshot are not compared: they are as familiar as the least familiar one of the others.
     """
 
     name = "perfect-memory"
     paper = "Zeil, Hofmann and Chahl 2003; Baddeley et al. 2012"
     takes_mask = True
+    takes_partial = True
 
     @property
     def snapshots(self) -> Float32[torch.Tensor, "m h w"]:
@@ -36,7 +42,7 @@ class PerfectMemory(IncrementalModel):
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
-        check_scan(views, self.shape)
+        check_scan(views, self.shape, is_partial(self.mask))
         if len(views) == 0:
             return self.scan(views), torch.empty(0, views.shape[2], dtype=torch.int64)
         familiarity, index = zip(*(self._nearest(self._on_device(batch)) for batch in in_batches(views)), strict=True)
@@ -52,6 +58,9 @@ class PerfectMemory(IncrementalModel):
         return {"snapshots": (None, height, width)}
 
     def _prepare(self) -> None:
+        if self.mask is not None and self.mask.partial:
+            self._overlaps = list(overlaps(self.snapshots, self.mask))
+            return
         if self.mask is not None:
             blocks = self.snapshots.split(FILTERS)
             self._banks = [(self._bank(block), energies(block.double(), None)[:, 0]) for block in blocks]
@@ -69,7 +78,7 @@ class PerfectMemory(IncrementalModel):
     def _nearest(self, views: Images, among: slice = slice(None)) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
         if self.mask is not None:
-            return self._nearest_seen(views, among)
+            return self._nearest_known(views) if self.mask.partial else self._nearest_seen(views, among)
         height, width = views.shape[1:]
         centred = views - self._level
         responses, index = self._filters.nearest(centred, among)
@@ -93,6 +102,19 @@ class PerfectMemory(IncrementalModel):
             least = torch.minimum(values, least)
         squared = (of_views + least).clamp(min=0)
         return -(squared / self._size(*views.shape[1:])).sqrt().float(), index
+
+    def _nearest_known(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+        """The same over what a view and each snapshot both show."""
+        blocks = [each.squared(views).min(dim=2) for each in self._overlaps]
+        squared, which = torch.stack([each.values for each in blocks]).min(dim=0)
+        indices = torch.stack([each.indices + k * BLOCK for k, each in enumerate(blocks)])
+        compared = squared.isfinite()
+        if not compared.any(dim=1).all():
+            raise SettingError(
+                f"{self.name}: a view shows too little of what any learned view shows; take images of the same camera"
+            )
+        farthest = squared.where(compared, -torch.inf).amax(dim=1, keepdim=True)
+        return -squared.where(compared, farthest).sqrt().float(), indices.gather(0, which[None])[0]
 
 
 @compiled(fastmath={"reassoc"})

@@ -19,6 +19,7 @@ class VisualCompass(Model):
     name = "visual-compass"
     paper = "Zeil, Hofmann and Chahl 2003"
     takes_mask = True
+    takes_partial = True
     dtypes = {"index": torch.int64}  # noqa: RUF012
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:

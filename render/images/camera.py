@@ -1,4 +1,4 @@
-"""A camera that sees all around: what its pictures are, and how panoramas are made of them."""
+"""A camera: what its pictures are, and how panoramas are made of them."""
 
 import logging
 import math
@@ -15,7 +15,7 @@ from .calibration import read_calibration
 from .lens_metadata import MAX_COLUMNS, MIN_ASPECT, natural_size
 from .pictures import Picture
 from .ring_search import find_ring
-from .unwrapping import LOOKING, MAX_PIXEL, MAX_SIZE, Fisheye, Omnidirectional, Panorama, Ring, Unwrapping
+from .unwrapping import LOOKING, MAX_PIXEL, MAX_SIZE, Fisheye, Omnidirectional, Panorama, PanoramaPart, Ring, Unwrapping
 
 log = logging.getLogger(__name__)
 
@@ -41,6 +41,8 @@ class Camera:
         bottom: Elevation of its lower edge (rad); None is -15 degrees.
         width: Columns of a panorama.
         height: Rows of a panorama.
+        field: Horizontal field of pictures that are a part of a panorama (rad): their columns are evenly spaced in azimuth. None: 360
+            degrees.
     """
 
     lens: str = choice("auto", LENSES)
@@ -56,11 +58,18 @@ class Camera:
     bottom: float | None = number(None, low=-math.pi / 2, high=math.pi / 2, unit="rad", optional=True)
     width: int | None = whole(None, low=4, high=MAX_SIZE, unit="pixels", optional=True)
     height: int | None = whole(None, low=1, high=MAX_SIZE, unit="pixels", optional=True)
+    field: float | None = number(None, above=0, high=2 * math.pi, unit="rad", optional=True)
 
     def __attrs_post_init__(self):
         if self.lens in ("fisheye", "omnidirectional") and self.calibration is None:
             raise FieldError(
                 "Camera", "", f"a {self.lens} lens needs a calibration; give the file of OpenCV's with K and D"
+            )
+        if self.field is not None and self.lens not in ("auto", "panorama"):
+            raise FieldError(
+                "Camera",
+                "",
+                f"a field is of pictures that are a part of a panorama, not of a lens {self.lens!r}; leave it out",
             )
         if self.calibration is not None and self.lens not in ("fisheye", "omnidirectional"):
             raise FieldError(
@@ -80,6 +89,8 @@ class Camera:
         """
         height, width = pictures[0].shape[:2]
         lens = self.lens
+        if lens == "auto" and self.field is not None:
+            lens = "panorama"
         if lens == "auto":
             lens = "panorama" if width >= MIN_ASPECT * height else "ring"
             log.warning("the pictures are %d x %d: each is taken as a %s; --lens takes another", width, height, lens)
@@ -104,7 +115,10 @@ class Camera:
         if lens == "ring":
             return self._ring(pictures, turned, top, bottom)
         if lens == "panorama":
-            return Panorama(width=width, height=height, top=top, bottom=bottom, **turned)
+            size: dict[str, Any] = {"width": width, "height": height, "top": top, "bottom": bottom}
+            return (
+                Panorama(**size, **turned) if self.field is None else PanoramaPart(**size, **turned, field=self.field)
+            )
         if lens == "equirectangular":
             if width != 2 * height:
                 log.warning("the pictures are %d x %d; an equirectangular one is twice as wide as high", width, height)
@@ -132,12 +146,13 @@ class Camera:
 
 
 def _usual_size(lens: Ring | Panorama | Fisheye | Omnidirectional, top: float, bottom: float) -> tuple[int, int]:
-    """Columns and rows of a panorama: of a panorama as it is, of other pictures not more than `MAX_COLUMNS`."""
+    """Columns and rows of a panorama: of a panorama, or a part of one, as it is; of other pictures not more than `MAX_COLUMNS`."""
     if isinstance(lens, Ring):
         return natural_size(lens)
     if isinstance(lens, Panorama):
         share = (top - bottom) / (lens.top - lens.bottom)
         whole_sphere = share < 1
-        width = min(lens.width, MAX_COLUMNS) if whole_sphere else lens.width
-        return width, max(1, round(lens.height * share * width / lens.width))
+        around = round(lens.width * 2 * math.pi / lens.field) if isinstance(lens, PanoramaPart) else lens.width
+        width = min(around, MAX_COLUMNS) if whole_sphere else around
+        return width, max(1, round(lens.height * share * width / around))
     return MAX_COLUMNS, max(1, round(MAX_COLUMNS * (top - bottom) / (2 * math.pi)))

@@ -116,6 +116,10 @@ def _recorded_eye(database: Database) -> dict[str, Any]:
         if str(fields.get("mask", "")).endswith(MASK_SUFFIX):  # as database import keeps it
             fields["mask"] = database.folder / str(fields["mask"])
         eye = Eye(**fields)
+        if eye.mask is not None and "world" not in group_in(database.metadata, "tussock"):
+            visible = eye.mask.visible()
+            if (visible != visible[:, :1]).any():  # rows that are covered all around are so at every heading: a mask
+                eye, recorded = attrs.evolve(eye, mask=None, known=eye.mask), {*recorded, "known"}
     except (InputError, TypeError) as error:
         raise FileError(
             f"{database.folder / METADATA}: its eye cannot be used ({first_line(error)}); repair it"

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int64, UInt8
+from jaxtyping import Bool, Float, Int64, UInt8
 from scipy.spatial import KDTree
 
 from tussock.world.errors import FileError, InputError
@@ -100,10 +100,10 @@ class DatabaseViews:
             training: The views to learn from; None: these.
 
         Raises:
-            FileError: Where the images have another size than the eye, or do not show what turning them would bring into view.
+            FileError: Where the images have another size than the eye, or it has a mask where images may not show what turns into view.
         """
         for each in databases:
-            _check_shows_all(each, eye)
+            _check_mask(each, eye)
         self.world, self.eye, self.training = world, eye, training or self
         self._entries = Entries.of(databases)
         self.poses = self._entries.poses
@@ -128,15 +128,26 @@ class DatabaseViews:
         Raises:
             InputError: A pose is not finite or too far, an image cannot be read, or the source is closed.
         """
-        poses = as_poses(poses)
-        rows, _ = self._entries.nearest(poses)
+        rows, columns = self._turned(poses)
         images = self._images(rows)
-        turns = wrap_angle(poses[:, 2] - self.poses[rows, 2])
-        columns = np.rint(columns_of_turn(turns, self.eye.width)).astype(int)
-        views = np.empty((len(poses), self.eye.height, self.eye.width, self._channels), dtype=np.uint8)
+        views = np.empty((len(rows), self.eye.height, self.eye.width, self._channels), dtype=np.uint8)
         for view, row, roll in zip(views, rows.tolist(), columns.tolist(), strict=True):
             view[:] = np.roll(images[row], roll, axis=1)
         return views
+
+    def known(self, poses: Poses) -> Bool[np.ndarray, "n height width"] | None:
+        """Which pixels of the views at poses show the world: `eye.known`, turned as each image is; None where all do."""
+        if self.eye.known is None:
+            return None
+        known = self.eye.known.visible()
+        return np.stack([np.roll(known, roll, axis=1) for roll in self._turned(poses)[1].tolist()])
+
+    def _turned(self, poses: Poses) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, " n"]]:
+        """The entry that is seen at each pose, and the columns by which its image is rolled."""
+        poses = as_poses(poses)
+        rows, _ = self._entries.nearest(poses)
+        turns = wrap_angle(poses[:, 2] - self.poses[rows, 2])
+        return rows, np.rint(columns_of_turn(turns, self.eye.width)).astype(np.int64)
 
     def _images(self, rows: Int64[np.ndarray, " n"]) -> dict[int, UInt8[np.ndarray, "height width channels"]]:
         """The images of entries, as they are."""
@@ -193,8 +204,8 @@ def open_views(route: Path, grid: Path | None = None, eye: Eye | None = None, he
     return DatabaseViews(databases[1:], eye, world, training=DatabaseViews(databases, eye, world))
 
 
-def _check_shows_all(database: Database, eye: Eye) -> None:
-    """Refuse images with parts that are unknown, as behind the body of a robot: turned with the view, they would be taken for the world.
+def _check_mask(database: Database, eye: Eye) -> None:
+    """Refuse a mask for images of others: if it says what they do not show, such as the body of a robot, that turns with the image.
 
     What tussock drew shows the full circle behind any mask. Rows that are hidden all around stay where they are. Raises FileError.
     """
@@ -203,8 +214,8 @@ def _check_shows_all(database: Database, eye: Eye) -> None:
     visible = eye.mask.visible()
     if (visible != visible[:, :1]).any():
         raise FileError(
-            f"{database.folder}: its mask hides parts that are not the same all around, and what is behind them is not known; import it "
-            "without --mask and with rows that show all around (--top-deg, --bottom-deg)"
+            f"{database.folder}: its mask hides parts that are not the same all around, and what is behind them is not known; make a "
+            "database of it with tussock database import --mask, which keeps what images do not show"
         )
 
 

@@ -111,6 +111,26 @@ class Panorama:
 
 
 @settings
+class PanoramaPart(Panorama):
+    """A picture that is a part of a panorama, with columns evenly spaced in azimuth, as of a camera that sees 180 degrees.
+
+    Attributes:
+        field: Horizontal field of view, about the middle of the picture (rad). `width` columns cover it.
+    """
+
+    field: float = number(math.pi, above=0, high=2 * math.pi, unit="rad")
+
+    def pixels(self, azimuth: Float[np.ndarray, " width"], elevation: Float[np.ndarray, " height"]) -> Pixels:
+        """Where each direction is in the picture; nan above the top, below the bottom and outside of the field."""
+        x, y = np.moveaxis(super().pixels(azimuth, elevation), 2, 0)
+        off = ((x + 0.5) / self.width - 0.5) * (
+            2 * math.pi / self.field
+        )  # shares of the picture to the right of its middle
+        inside = np.clip((off + 0.5) * self.width - 0.5, 0, self.width - 1)
+        return np.stack([np.where(np.abs(off) <= 0.5 + 1e-9, inside, np.nan), y], axis=2)
+
+
+@settings
 class Calibrated:
     """What calibrated lenses have in common.
 
@@ -235,7 +255,7 @@ class Unwrapping:
                 f"a picture of {picture.shape[1]} x {picture.shape[0]}; give sides up to {MAX_SIZE} pixels"
             )
         x, y = _tables(self)
-        around = isinstance(self.lens, Panorama)  # its left edge is beside its right edge
+        around = type(self.lens) is Panorama  # its left edge is beside its right edge
         border = cv2.BORDER_WRAP if around else cv2.BORDER_CONSTANT
         samples = cv2.remap(picture, x, y, cv2.INTER_LINEAR, borderMode=border)
         if samples.shape[:2] == (self.height, self.width):
@@ -244,9 +264,13 @@ class Unwrapping:
 
     def seen(self, height: int, width: int) -> Bool[np.ndarray, "rows columns"]:
         """Which pixels of the panorama a picture of a size shows. They may be all."""
-        x, y = _base_tables(self)
+        samples = (
+            3 if isinstance(self.lens, PanoramaPart) else 1
+        )  # in each column: its edges may be in the middle of one
+        x, y = _base_tables(self, across=samples)
         margin = 0.5 if isinstance(self.lens, Panorama) else 0.0
-        return (x >= -margin) & (x <= width - 1 + margin) & (y >= 0) & (y <= height - 1)  # False for nan
+        inside = (x >= -margin) & (x <= width - 1 + margin) & (y >= 0) & (y <= height - 1)  # False for nan
+        return np.asarray(inside.reshape(self.height, self.width, samples).all(axis=2))
 
 
 def _base_tables(unwrapping: Unwrapping, across: int = 1, down: int = 1) -> tuple[np.ndarray, np.ndarray]:

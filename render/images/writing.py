@@ -158,6 +158,8 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
 def _plain(eye: Eye) -> dict[str, Any]:
     """The fields of an eye as the metadata holds them: OpenCV reads no text of over 4096 bytes, so that of a mask is cut to pieces."""
     fields = eye.plain() | {"samples": eye.rays}
-    if eye.mask is None:
-        return fields
-    return fields | {"mask": [eye.mask[start : start + MASK_PIECE] for start in range(0, len(eye.mask), MASK_PIECE)]}
+    masks = {name: mask for name in ("mask", "known") if (mask := getattr(eye, name)) is not None}
+    return fields | {
+        name: [mask[start : start + MASK_PIECE] for start in range(0, len(mask), MASK_PIECE)]
+        for name, mask in masks.items()
+    }
