@@ -117,10 +117,16 @@ def _thinned(xy, count: int, apart: float) -> Float[np.ndarray, "n 2"]:
     """The first `count` points, without those that are within `apart` metres of an earlier one."""
     if apart == 0:
         return xy[:count]
+    cells = np.floor(xy / apart).astype(int).tolist()  # a point is within `apart` of those in cells next to its own only
     kept: list[int] = []
-    for i in range(len(xy)):
-        if len(kept) < count and (np.hypot(*(xy[kept] - xy[i]).T) > apart).all():
+    kept_in: dict[tuple[int, int], list[int]] = {}
+    for i, (column, row) in enumerate(cells):
+        if len(kept) == count:
+            break
+        near = [k for dx in (-1, 0, 1) for dy in (-1, 0, 1) for k in kept_in.get((column + dx, row + dy), ())]
+        if not near or (np.hypot(*(xy[near] - xy[i]).T) > apart).all():
             kept.append(i)
+            kept_in.setdefault((column, row), []).append(i)
     return xy[kept]
 
 
