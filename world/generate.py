@@ -117,7 +117,9 @@ def _thinned(xy, count: int, apart: float) -> Float[np.ndarray, "n 2"]:
     """The first `count` points, without those that are within `apart` metres of an earlier one."""
     if apart == 0:
         return xy[:count]
-    cells = np.floor(xy / apart).astype(int).tolist()  # a point is within `apart` of those in cells next to its own only
+    cells = (
+        np.floor(xy / (1.001 * apart)).astype(int).tolist()
+    )  # what is within `apart` of a point is in a cell next to its own
     kept: list[int] = []
     kept_in: dict[tuple[int, int], list[int]] = {}
     for i, (column, row) in enumerate(cells):

@@ -221,7 +221,7 @@ def _is_off_ground(world: World, inside: Bounds, size: Int[np.ndarray, "2"]) -> 
     """Which cells of the grid of clearances have no ground, or ground that is too steep to a neighbour."""
     assert world.terrain is not None
     x, y = (np.arange(-MARGIN, n - MARGIN) * CELL + low for n, low in zip(size, inside[:2], strict=True))
-    height = np.stack([world.ground_height(np.column_stack([x, np.full(len(x), row)])) for row in y])
+    height = world.terrain.height_on_grid(x, y)
     off = np.isnan(height)
     for axis in (0, 1):
         here, there = off.swapaxes(0, axis)[:-1], off.swapaxes(0, axis)[1:]  # views: they change `off`
