@@ -23,7 +23,7 @@ Layout = dict[str, Float[np.ndarray, "n 4"]]  # of each kind: x, y, size (m), an
 Streams = dict[str, np.random.Generator]
 
 STREAMS = ("land", "bush", "stone", "tussock", "grass", "leaf", "tree")  # append new ones: old seeds stay as they are
-SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "grass": grass, "leaf": leaf}
+SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "leaf": leaf}
 
 
 def generate_plants(params: WorldParams, seed: int) -> Plant:
@@ -35,6 +35,11 @@ def generate_plants(params: WorldParams, seed: int) -> Plant:
     field = params.field
     triangles, rgb = [np.zeros((0, 3, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
     for kind, rows in layout.items():
+        if kind == "grass":
+            corners, colours = grass(params, rows, streams[kind])
+            triangles.append(corners)
+            rgb.append(colours)
+            continue
         for x, y, size, tone in rows.tolist():
             if kind == "tree":
                 distance = max(field.x_min - x, x - field.x_max, field.y_min - y, y - field.y_max, 0.0)
