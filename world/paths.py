@@ -38,9 +38,8 @@ TO_NEIGHBOURS = (
 )  # rows and columns of nodes; and back
 
 Window = tuple[int, int, int, int]  # of nodes: rows from, rows to, columns from, columns to
-Edges = tuple[
-    Int[np.ndarray, " n"], Int[np.ndarray, " n"], Float[np.ndarray, " n"]
-]  # from, to (numbers of nodes), cost
+# Numbers of the nodes that edges go from and to, and costs.
+Edges = tuple[Int[np.ndarray, " edges"], Int[np.ndarray, " edges"], Float[np.ndarray, " edges"]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ def tussock(p: WorldParams, size: float, tone: float, rng: np.random.Generator) 
     return joined(pieces)
 
 
-def grass(p: WorldParams, rows: Float[np.ndarray, "n 4"], rng: np.random.Generator) -> Plant:
+def grass(p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Generator) -> Plant:
     """Tufts of one or a few upright blades, some with a flower on the longest, one after the other, each at its place.
 
     There are so many that their blades are shaped together.

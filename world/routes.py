@@ -144,6 +144,8 @@ def _random_corners(
 
 def _smoothed(path: Float[np.ndarray, "k 2"], smoothing: float, length: float) -> Float[np.ndarray, "n 2"] | None:
     """The path, smoothed over about `smoothing` metres and cut to `length`; None if it is shorter."""
+    if len(path) < 2:  # all corners are nearest to one node
+        return None
     smooth = gaussian_filter1d(_resampled(path), smoothing / SPACING, axis=0, mode="nearest")
     route = _resampled(smooth)
     n = round(length / SPACING) + 1
