@@ -410,7 +410,7 @@ def test_the_cheapest_path_is_that_of_a_search_in_the_whole_field(preset):
         straight = float(np.hypot(*np.diff(paths.xy(np.array([start, stop])), axis=0)[0]))
         shorter += paths._window(paths.xy(np.array([start, stop])), 1.2 * straight) != whole
         assert is_unique or world.origin["params"]["trees"] == 0
-        assert cost >= straight
+        assert cost >= straight * (1 - 1e-12)
     assert shorter > 10  # a window is less than the field
 
 
@@ -450,14 +450,11 @@ def test_a_world_without_room_is_refused():
         generate_route(bare(floor), 0)
 
 
-def test_a_short_route_among_dense_plants_is_found_or_refused():
-    """Where all its corners may be nearest to the same node."""
+def test_a_short_route_is_found_among_dense_plants():
+    """Where all corners of some draws are nearest to one node."""
     world = World.generate("tiny tussock_density=20", 0)
-    for seed in range(12):
-        try:
-            assert generate_route(world, seed, 0.1).length == pytest.approx(0.1, rel=0.1)
-        except InputError as error:
-            assert "clear of plants" in str(error)
+    for seed in range(6):
+        assert generate_route(world, seed, 0.1).length == pytest.approx(0.1, rel=0.1)
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, float("nan")])
