@@ -31,9 +31,9 @@ format: $(VENV)/developer
 	$(BIN)/ruff format .
 
 bench: $(VENV)/developer  ## the benchmarks, into docs/performance.md; run it while nothing else runs
-	for part in views matching walks; do \
+	for part in views matching walks worlds; do \
 		$(BIN)/pytest benchmarks/bench_$$part.py --benchmark-quiet --benchmark-json=$(VENV)/bench_$$part.json || exit; done
-	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks,$(VENV)/bench_$(part).json)
+	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks worlds,$(VENV)/bench_$(part).json)
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

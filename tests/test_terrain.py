@@ -71,6 +71,19 @@ def test_heights_are_those_of_looking_at_every_triangle(seed):
     assert (height <= highest + 1e-4).all()
 
 
+@given(st.integers(0, 10**6))
+def test_heights_on_a_grid_are_those_at_its_points(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 60))
+    size = 10.0 ** rng.uniform(-4, 1.5, (n, 1, 1))
+    corners = rng.uniform(-3, 3, (n, 1, 3)) + size * rng.normal(size=(n, 3, 3))
+    triangles = np.concatenate([corners, np.round(2 * corners) / 2]).astype(np.float32)  # some with corners on the grid
+    terrain = all_ground(triangles)
+    x, y = np.linspace(-4, 4, 17), np.linspace(-4, 4.5, 35)
+    points = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    np.testing.assert_array_equal(terrain.height_on_grid(x, y).ravel(), terrain.height(points))
+
+
 def test_the_highest_of_several_surfaces_counts():
     floors = [surface(lambda x, y, z=z: z + 0.1 * x, 1.0) for z in (0.0, -2.0, 1.5)]
     np.testing.assert_allclose(all_ground(np.concatenate(floors).astype(np.float32)).height(MIDDLE), [1.8], atol=1e-6)

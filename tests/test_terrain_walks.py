@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import hashlib
 import itertools
 import json
 
@@ -186,6 +187,13 @@ def test_a_route_over_hills_keeps_clear_of_posts_whatever_the_height():
             assert distance.min() > 0.04 - 0.017
             assert clearance(world, route.xy).min() >= 0.04
             check_route(world, route)
+
+
+def test_a_seed_keeps_giving_the_same_route_over_a_mesh():
+    known = ["cd6e05d013a3", "a102dd59c97c", "65761c7474f1"]  # to a tenth of a millimetre
+    routes = [generate_route(posts_on_hills().on_mesh(), seed, 4.0) for seed in range(3)]
+    tenths = [np.round(route.xy * 1e4).astype(np.int64).tobytes() for route in routes]
+    assert [hashlib.sha256(each).hexdigest()[:12] for each in tenths] == known
 
 
 def test_heights_of_obstacles_are_those_above_the_ground():

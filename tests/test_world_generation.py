@@ -7,6 +7,7 @@ import subprocess
 import sys
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -15,9 +16,11 @@ from scipy.stats import chi2
 from tussock import world as world_package
 from tussock.world.errors import InputError, SettingError
 from tussock.world.files import open_world
-from tussock.world.generate import plant_layout
+from tussock.world.generate import _thinned, plant_layout
 from tussock.world.geometry import Bounds, wrap_angle
+from tussock.world.obstacles import footprints
 from tussock.world.params import WORLDS, WorldParams, check_preset, is_generated
+from tussock.world.paths import Paths
 from tussock.world.routes import clearance, generate_route
 from tussock.world.scene import Ground, World
 from tussock.world.settings import describe
@@ -66,6 +69,52 @@ def test_another_process_generates_the_same_world_and_route():
     world = generated("tiny", 5)
     here = world.triangles.tobytes() + world.rgb.tobytes() + generate_route(world, 2).poses.tobytes()
     assert there == hashlib.sha256(here).hexdigest()
+
+
+def rounded(*arrays) -> str:
+    """Digest of arrays, to a tenth of a millimetre."""
+    tenths = [np.round(array.astype(np.float64) * 1e4).astype(np.int64).tobytes() for array in arrays]
+    return hashlib.sha256(b"".join(tenths)).hexdigest()[:12]
+
+
+@pytest.mark.parametrize(
+    ("text", "seed", "known", "route_seed", "length", "goal", "known_route"),
+    [
+        ("tussock-field", 5, "e59fd37d7cdc", 1, 8.0, None, "20eeee2ecff9"),
+        ("meadow", 5, "c1512b59599e", 1, 8.0, None, "871cdc715564"),
+        ("scrub", 5, "700445762445", 1, 8.0, None, "1edbab5cb472"),
+        ("tiny", 5, "76b543786054", 1, 8.0, None, "acd623f325ac"),
+        ("meadow flower_share=1 grass_height=0.14 field_depth=4", 2, "f93518b80c0f", 3, 4.0, None, "26d410f2c95c"),
+        ("tussock-field field_width=18 field_depth=14", 1, "dc47bb3c69c3", 2, 12.0, None, "b05323666b9d"),
+        ("scrub", 6, "38a27787c532", 1, 3.0, (3.25, 4.25), "94d931989501"),
+        (
+            "tiny tussock_density=0 grass_density=0 trees=0 field_width=4 field_depth=4",
+            0,
+            "e3b0c44298fc",
+            0,
+            4.0,
+            (2.0, 2.0),
+            "907bcf9e0812",
+        ),
+    ],
+)
+def test_a_seed_keeps_giving_the_same_world_and_route(text, seed, known, route_seed, length, goal, known_route):
+    """A change of these digests raises GENERATOR, and makes all results before it incomparable."""
+    world = World.generate(text, seed)
+    assert rounded(world.triangles, world.rgb) == known
+    assert rounded(generate_route(world, route_seed, length, goal).xy) == known_route
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.05, 0.3, 2.0])
+def test_plants_keep_apart_from_all_that_were_placed_before(apart):
+    rng = np.random.default_rng(0)
+    for xy in (rng.uniform(-1, 9, (600, 2)), np.round(rng.uniform(-1, 9, (600, 2)), 1)):
+        for count in (0, 20, 600):
+            kept: list[np.ndarray] = []
+            for point in xy:
+                if len(kept) < count and all(np.hypot(*(point - other)) > apart or apart == 0 for other in kept):
+                    kept.append(point)
+            np.testing.assert_array_equal(_thinned(xy, count, apart), np.reshape(kept, (-1, 2)))
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -152,7 +201,7 @@ def test_an_empty_world_can_be_generated():
 
 
 INVALID = {
-    "field_width": (0.0, 51, None, "wide"),
+    "field_width": (0.0, 101, None, "wide"),
     "tussock_density": (-1.0, [1]),
     "grass_height": (float("nan"), float("inf")),
     "trees": (-1, 2.5, True),
@@ -169,7 +218,7 @@ def test_an_invalid_parameter_is_refused_by_name(name, value):
 
 
 def test_an_invalid_value_is_reported_with_its_range_and_unit():
-    with pytest.raises(SettingError, match=r"field_width is 900.0; .*from 1 to 50 \(m\)"):
+    with pytest.raises(SettingError, match=r"field_width is 900.0; .*from 1 to 100 \(m\)"):
         World.generate("tiny field_width=900")
 
 
@@ -203,7 +252,7 @@ def test_parameters_may_follow_a_preset():
     [
         ("", ("unknown world ''", "tussock-field")),
         ("tiny width=3", ("'tiny width=3'", "tiny has no parameter 'width'", "field_width")),
-        ("tiny field_width=900", ("field_width is 900", "50")),
+        ("tiny field_width=900", ("field_width is 900", "100")),
         ("tiny world.glb", ("'tiny world.glb'", "'world.glb'", "name=value")),
         ("tiny seed=3", ("'tiny seed=3'", "seed=")),
     ],
@@ -324,7 +373,45 @@ def test_clearance_is_the_distance_to_the_nearest_obstacle():
     assert np.isinf(clearance(bare([lying, overhead]), positions)).all()
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_clearance_is_that_of_looking_at_every_obstacle(seed):
+    """Triangles of all sizes, some upright, at positions in them, among them and far from all."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 150))
+    size = 10.0 ** rng.uniform(-2, 0.5, (n, 1, 1))
+    triangles = rng.uniform([[[0, 0, -0.01]]], [[[2, 2, 0.1]]], (n, 1, 3)) + size * rng.normal(size=(n, 3, 3))
+    triangles[: n // 4, 2, :2] = triangles[: n // 4, 0, :2]
+    world = bare(triangles)
+    spread = [rng.uniform(-1, 3, (600, 2)), rng.uniform(-300, 300, (20, 2)), world.triangles[:, 0, :2].astype(float)]
+    positions = np.concatenate(spread)
+    shapes = footprints(world).astype(np.float32)
+    each = [
+        [max(0.0, -cv2.pointPolygonTest(shape, position, measureDist=True)) for shape in shapes]
+        for position in positions.tolist()
+    ]
+    expected = np.min(each, axis=1, initial=np.inf)
+    np.testing.assert_allclose(clearance(world, positions), expected, atol=2e-5)
+
+
 # Routes
+
+
+@pytest.mark.parametrize("preset", ["scrub", "tiny", "tiny tussock_density=0 grass_density=0 trees=0"])
+def test_the_cheapest_path_is_that_of_a_search_in_the_whole_field(preset):
+    """Also where many paths cost the same, as in an empty field."""
+    world = generated(preset, 3)
+    paths = Paths.of(world, world.field.widened(-0.1))
+    whole = (0, paths.shape[0], 0, paths.shape[1])
+    rng = np.random.default_rng(0)
+    shorter = 0
+    for start, stop in rng.choice(paths.nodes, (25, 2)).tolist():
+        cost, path, is_unique = paths._search(whole, start, stop)
+        assert paths._cheapest(start, stop) == path
+        straight = float(np.hypot(*np.diff(paths.xy(np.array([start, stop])), axis=0)[0]))
+        shorter += paths._window(paths.xy(np.array([start, stop])), 1.2 * straight) != whole
+        assert is_unique or world.origin["params"]["trees"] == 0
+        assert cost >= straight * (1 - 1e-12)
+    assert shorter > 10  # a window is less than the field
 
 
 @pytest.mark.parametrize(
@@ -361,6 +448,13 @@ def test_a_world_without_room_is_refused():
     floor = [[[0, 0, 0.02], [2, 0, 0.02], [2, 2, 0.02]], [[0, 0, 0.02], [2, 2, 0.02], [0, 2, 0.02]]]
     with pytest.raises(InputError, match="clear of plants"):
         generate_route(bare(floor), 0)
+
+
+def test_a_short_route_is_found_among_dense_plants():
+    """Where all corners of some draws are nearest to one node."""
+    world = World.generate("tiny tussock_density=20", 0)
+    for seed in range(6):
+        assert generate_route(world, seed, 0.1).length == pytest.approx(0.1, rel=0.1)
 
 
 @pytest.mark.parametrize("length", [0.0, -1.0, float("nan")])

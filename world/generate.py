@@ -23,7 +23,7 @@ Layout = dict[str, Float[np.ndarray, "n 4"]]  # of each kind: x, y, size (m), an
 Streams = dict[str, np.random.Generator]
 
 STREAMS = ("land", "bush", "stone", "tussock", "grass", "leaf", "tree")  # append new ones: old seeds stay as they are
-SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "grass": grass, "leaf": leaf}
+SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "leaf": leaf}
 
 
 def generate_plants(params: WorldParams, seed: int) -> Plant:
@@ -35,6 +35,11 @@ def generate_plants(params: WorldParams, seed: int) -> Plant:
     field = params.field
     triangles, rgb = [np.zeros((0, 3, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
     for kind, rows in layout.items():
+        if kind == "grass":
+            corners, colours = grass(params, rows, streams[kind])
+            triangles.append(corners)
+            rgb.append(colours)
+            continue
         for x, y, size, tone in rows.tolist():
             if kind == "tree":
                 distance = max(field.x_min - x, x - field.x_max, field.y_min - y, y - field.y_max, 0.0)
@@ -117,10 +122,18 @@ def _thinned(xy, count: int, apart: float) -> Float[np.ndarray, "n 2"]:
     """The first `count` points, without those that are within `apart` metres of an earlier one."""
     if apart == 0:
         return xy[:count]
+    cells = (
+        np.floor(xy / (1.001 * apart)).astype(int).tolist()
+    )  # what is within `apart` of a point is in a cell next to its own
     kept: list[int] = []
-    for i in range(len(xy)):
-        if len(kept) < count and (np.hypot(*(xy[kept] - xy[i]).T) > apart).all():
+    kept_in: dict[tuple[int, int], list[int]] = {}
+    for i, (column, row) in enumerate(cells):
+        if len(kept) == count:
+            break
+        near = [k for dx in (-1, 0, 1) for dy in (-1, 0, 1) for k in kept_in.get((column + dx, row + dy), ())]
+        if not near or (np.hypot(*(xy[near] - xy[i]).T) > apart).all():
             kept.append(i)
+            kept_in.setdefault((column, row), []).append(i)
     return xy[kept]
 
 

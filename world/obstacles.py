@@ -1,13 +1,37 @@
 """Obstacles: what the triangles of a world cover on the ground, between the heights that an insect walks over and walks under."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from typing import TypeVar
+from weakref import WeakKeyDictionary
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from .scene import World
 from .terrain import STEP_HEIGHT, Terrain
 
+Made = TypeVar("Made")
+
 BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
+MIN_LEVEL = -4  # shapes within 2 ** -4 m of their middle are of one size
+SLACK = 1e-6  # m; more than the rounding of any distance
+BATCH = 500  # positions at once, which bounds the memory of the shapes near them
+
+
+def once_per_world(make: Callable[[World], Made]) -> Callable[[World], Made]:
+    """A function of a world whose result is kept as long as the world, which never changes."""
+    kept: WeakKeyDictionary[World, Made] = WeakKeyDictionary()
+
+    @wraps(make)
+    def get(world: World) -> Made:
+        if world not in kept:
+            kept[world] = make(world)
+        return kept[world]
+
+    return get
 
 
 def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
@@ -16,20 +40,51 @@ def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "
     Steep ground and the edge of the ground do not count.
     """
     xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-    shapes = footprints(world)
-    if len(shapes) == 0:
-        return np.full(len(xy), np.inf)
-    middle = shapes.mean(axis=1)
-    radius = np.hypot(*np.moveaxis(shapes - middle[:, None], -1, 0)).max(axis=1)
-    to_corner = KDTree(shapes.reshape(-1, 2)).query(xy)[0]  # the nearest obstacle is not farther than this
-    distance = to_corner.copy()
-    for batch in np.array_split(np.arange(len(xy)), len(xy) // 500 + 1):
-        x, y = (xy[batch, None, i] - middle[:, i] for i in (0, 1))
-        row, shape = np.nonzero(x * x + y * y < (to_corner[batch, None] + radius) ** 2)  # all others are farther
-        np.minimum.at(distance, batch[row], _distance_to(shapes[shape], xy[batch[row]]))
+    parts = [_clearance(world, xy[at : at + BATCH]) for at in range(0, len(xy), BATCH)]
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """The clearance of positions (m). The nearest obstacle is not farther than that with the nearest middle."""
+    shapes, distance = footprints(world), np.full(len(xy), np.inf)
+    for size in _by_size(world):
+        nearest = size.members[size.middles.query(xy)[1]]
+        distance = np.minimum(distance, _distance_to(shapes[nearest], xy))
+    for size in _by_size(world):
+        near = size.middles.query_ball_point(xy, distance + size.radius + SLACK, return_sorted=False)
+        row = np.repeat(np.arange(len(xy)), [len(each) for each in near])
+        shape = size.members[np.concatenate(near).astype(np.int64)]
+        np.minimum.at(distance, row, _distance_to(shapes[shape], xy[row]))
     return distance
 
 
+@dataclass(frozen=True, eq=False)
+class _OneSize:
+    """Footprints of about the same size.
+
+    Attributes:
+        members: Which footprints these are.
+        middles: The mean of the corners of each.
+        radius: No corner is farther than this from the middle of its footprint (m).
+    """
+
+    members: Int[np.ndarray, " n"]
+    middles: KDTree
+    radius: float
+
+
+@once_per_world
+def _by_size(world: World) -> list[_OneSize]:
+    """The footprints of a world, by size: a few large ones would widen the search among all the small ones."""
+    shapes = footprints(world)
+    middle = shapes.mean(axis=1)
+    radius = np.hypot(*np.moveaxis(shapes - middle[:, None], -1, 0)).max(axis=1)
+    level = np.maximum(np.frexp(radius)[1], MIN_LEVEL)
+    members = [np.flatnonzero(level == number) for number in np.unique(level)]
+    return [_OneSize(these, KDTree(middle[these]), float(radius[these].max())) for these in members]
+
+
+@once_per_world
 def footprints(world: World) -> Float[np.ndarray, "n 6 2"]:
     """The part of each triangle between ground and body height, seen from above: a convex shape, its corners in order.
 

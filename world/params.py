@@ -70,8 +70,8 @@ class WorldParams:
 
     name: ClassVar[str] = "world"  # in errors
 
-    field_width: float = number(10.0, low=1, high=50, unit="m")
-    field_depth: float = number(10.0, low=1, high=50, unit="m")
+    field_width: float = number(10.0, low=1, high=100, unit="m")
+    field_depth: float = number(10.0, low=1, high=100, unit="m")
     border: float = number(1.0, low=0, high=10, unit="m")
     ground_margin: float = number(15.0, low=1, high=200, unit="m")
     ground_rgb: RGB = colour((203, 170, 118))

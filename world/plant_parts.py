@@ -130,9 +130,12 @@ def tinted(rgb: RGB, n: int, strength: float, rng: np.random.Generator) -> Float
     return np.array(rgb) * rng.lognormal(0, strength, (n, 1)) * rng.lognormal(0, strength / 3, (n, 3))
 
 
-def darker_below(rgb, triangles, height: float) -> Float[np.ndarray, "n 3"]:
-    """Colours of the triangles of blades (blade, triangle, corner, xyz): dark near the ground, where they are shaded."""
-    rise = np.clip(triangles[..., 2].mean(axis=2) / height, 0, 1)
+def darker_below(rgb, triangles, height) -> Float[np.ndarray, "n 3"]:
+    """Colours of the triangles of blades (blade, triangle, corner, xyz): dark near the ground, where they are shaded.
+
+    height: that of the plant (m), or of the plant of each blade.
+    """
+    rise = np.clip(triangles[..., 2].mean(axis=2) / np.reshape(height, (-1, 1)), 0, 1)
     return (rgb[:, None] * (0.58 + 0.5 * rise**0.6)[..., None]).reshape(-1, 3)
 
 

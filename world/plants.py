@@ -1,7 +1,7 @@
 """One plant or stone from the parameters of a world, each as triangles at the origin, z up, with one colour per triangle.
 
-All functions take the parameters, the size (m), the tone (0 to 1: how colours vary over the land) and a generator. They draw
-from the generator always in the same order. Colours include sunlight, so a plant may be moved but not turned.
+All functions take the parameters, the size (m), the tone (0 to 1: how colours vary over the land) and a generator; `grass` takes
+all tufts at once. They draw from the generator always in the same order. Colours include sunlight, so a plant may be moved but not turned.
 """
 
 import numpy as np
@@ -55,24 +55,64 @@ def tussock(p: WorldParams, size: float, tone: float, rng: np.random.Generator) 
     return joined(pieces)
 
 
-def grass(p: WorldParams, size: float, tone: float, rng: np.random.Generator) -> Plant:
-    """A tuft of one or a few upright blades, some with a flower on the longest. size: height of its blades (m)."""
+def grass(p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Generator) -> Plant:
+    """Tufts of one or a few upright blades, some with a flower on the longest, one after the other, each at its place.
+
+    There are so many that their blades are shaped together.
+
+    Args:
+        p: Parameters of the world.
+        rows: x, y, height of the blades (m) and tone of each tuft.
+        rng: Generator to draw from, tuft after tuft.
+    """
+    if len(rows) == 0:
+        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8)
+    tufts, flowers = zip(*(_tuft(p, size, tone, rng) for _, _, size, tone in rows.tolist()), strict=True)
+    blades = np.array([len(tuft[0]) for tuft in tufts])
+    of_tuft = np.repeat(np.arange(len(rows)), blades)
+    foot, side, length, lean, bend, width, tint = map(np.concatenate, zip(*tufts, strict=True))
+    segments = _grass_segments(rows[:, 2])
+    per_blade = 2 * segments - 1  # triangles
+    count = blades * per_blade + [0 if flower is None else len(flower[0]) for flower in flowers]
+    first = count.cumsum() - count  # of each tuft's triangles
+    triangles, rgb = np.empty((count.sum(), 3, 3), np.float32), np.empty((count.sum(), 3), np.uint8)
+    nth = np.arange(len(of_tuft)) - np.repeat(blades.cumsum() - blades, blades)  # of its tuft
+    for k in np.unique(segments).tolist():
+        these = segments[of_tuft] == k
+        tuft, shape = of_tuft[these], spines(foot[these], side[these], length[these], lean[these], bend[these], k)
+        blade = ribbons(shape, side[these], width[these])
+        colours = darker_below(tint[these], blade, rows[tuft, 2])
+        at = (first[tuft] + nth[these] * (2 * k - 1))[:, None] + np.arange(2 * k - 1)
+        triangles[at.ravel()], rgb[at.ravel()] = sunlit(blade.reshape(-1, 3, 3), colours, thin=True)
+    for start, flower in zip((first + blades * per_blade).tolist(), flowers, strict=True):
+        if flower is not None:
+            triangles[start : start + len(flower[0])], rgb[start : start + len(flower[0])] = flower
+    offset = np.column_stack([rows[:, :2], np.zeros(len(rows))]).astype(np.float32)
+    return triangles + np.repeat(offset, count, axis=0)[:, None], rgb
+
+
+def _grass_segments(height):
+    """Segments of blades of some height (m): the bend of a short one is not visible."""
+    return np.where(height > 0.13, 2, 1)
+
+
+def _tuft(p: WorldParams, size: float, tone: float, rng: np.random.Generator) -> tuple[tuple, Plant | None]:
+    """The blades of a tuft of grass (foot, side, length, lean, bend, width and tint of each), and its flower, if it has one."""
     rgb = mixed(p.grass_rgb, p.dry_rgb, min(0.9, 4 * p.dry_share * max(0.0, tone - 0.4)))
     has_flower, blades = rng.random() < p.flower_share, int(rng.integers(1, p.grass_blades + 1))
     side = rng.uniform(-np.pi, np.pi, blades)
-    foot = np.column_stack([rng.normal(0, 0.012, (blades, 2)), np.zeros(blades)])
+    foot = np.zeros((blades, 3))
+    foot[:, :2] = rng.normal(0, 0.012, (blades, 2))
     length = size * rng.uniform(0.65, 1.1, blades)
     width = (0.004 + 0.036 * size) * rng.lognormal(0, 0.25, blades)
-    segments = 2 if size > 0.13 else 1  # the bend of a short blade is not visible
-    spine = spines(foot, side, length, rng.gamma(2.0, 0.09, blades), rng.gamma(2.0, 0.22, blades), segments)
-    triangles = ribbons(spine, side, width)
-    tint = darker_below(tinted(rgb, blades, 0.16, rng), triangles, size)
-    pieces = [sunlit(triangles.reshape(-1, 3, 3), tint, thin=True)]
-    if has_flower:
-        tip = np.repeat(spine[None, length.argmax(), -1], 3, axis=0)
-        petals = simple_leaves(tip, directions(3, rng) + UP, 0.022 + 0.03 * size, rng)
-        pieces.append(sunlit(petals, tinted(p.flower_rgb, 3, 0.08, rng), thin=True))
-    return joined(pieces)
+    lean, bend = rng.gamma(2.0, 0.09, blades), rng.gamma(2.0, 0.22, blades)
+    blade = (foot, side, length, lean, bend, width, tinted(rgb, blades, 0.16, rng))
+    if not has_flower:
+        return blade, None
+    spine = spines(foot, side, length, lean, bend, int(_grass_segments(size)))
+    tip = np.repeat(spine[None, length.argmax(), -1], 3, axis=0)
+    petals = simple_leaves(tip, directions(3, rng) + UP, 0.022 + 0.03 * size, rng)
+    return blade, sunlit(petals, tinted(p.flower_rgb, 3, 0.08, rng), thin=True)
 
 
 def bush(p: WorldParams, size: float, tone: float, rng: np.random.Generator) -> Plant:

@@ -5,31 +5,23 @@ world's mesh (`World.on_mesh`), the ground is not an obstacle, heights are those
 off its edge. Lengths are measured over the x-y plane.
 """
 
-import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import KDTree
 
 from .errors import InputError, SettingError
 from .generate import seeded
 from .geometry import Bounds, Route, place_text
-from .obstacles import clearance, footprints
+from .obstacles import clearance
 from .origin import shown
+from .paths import CELL, MARGIN, MIN_CLEARANCE, PREFERRED_CLEARANCE, Paths
 from .scene import World
 
-MIN_CLEARANCE = 0.04  # m from every obstacle
-PREFERRED_CLEARANCE = 0.12  # m; with less, a path costs more than twice its length
 MIN_LENGTH = 0.1  # m of a route
 SPACING = 0.01  # m between points of a route
 MAX_TURN = np.radians(30)  # of a route within 2 cm
 MAX_ATTEMPTS = 60
 
-CELL = 0.02  # m, of the grid of clearances
-MARGIN = 20  # cells around the field, so that obstacles just outside it count
-NODE_SPACING = 3  # cells between the nodes through which paths are planned
 MAX_CHECKED = 10**6  # points of a route
 MAX_CELLS = 4 * 10**7  # of the grid: a field of 126 m x 126 m
 
@@ -61,10 +53,10 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     inside = field.widened(-min(0.3, 0.05 * float(field.size.min())))
     if goal is not None:
         _check_goal(world, goal, inside)
-    nodes, graph = _path_graph(_clearance_grid(world, inside), inside)
-    for _ in range(MAX_ATTEMPTS if len(nodes) else 0):
+    paths = Paths.of(world, inside)
+    for _ in range(MAX_ATTEMPTS if len(paths.nodes) else 0):
         corners = _random_corners(inside, length, rng, goal)  # they begin at the goal, where there is one
-        path = _cheapest_path(corners, nodes, graph) if corners is not None else None
+        path = paths.through(corners) if corners is not None else None
         if path is None:
             continue
         for smoothing in (0.16, 0.11, 0.07, 0.045):
@@ -133,57 +125,6 @@ def _check_goal(world: World, goal: tuple[float, ...], inside: Bounds) -> None:
         )
 
 
-def _clearance_grid(world: World, inside: Bounds) -> Float[np.ndarray, "rows columns"]:
-    """Clearance (m), to about a cell, on a grid from the lower left corner of `inside`; rows run along y."""
-    size = np.ceil(inside.size / CELL).astype(int) + 1 + 2 * MARGIN
-    free = np.full((size[1], size[0]), 255, np.uint8)
-    cells = (footprints(world) - np.array(inside[:2])) / CELL + MARGIN
-    visible = np.logical_and(cells.max(axis=1) > 0, cells.min(axis=1) < size).all(axis=1)
-    for shape in np.round(cells[visible] * 16).astype(np.int32):
-        cv2.fillConvexPoly(free, shape, 0, shift=4)
-    if world.terrain is not None:
-        free[_is_off_ground(world, inside, size)] = 0
-    distance = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * CELL
-    return distance[MARGIN:-MARGIN, MARGIN:-MARGIN]
-
-
-def _is_off_ground(world: World, inside: Bounds, size: Int[np.ndarray, "2"]) -> Bool[np.ndarray, "rows columns"]:
-    """Which cells of the grid of clearances have no ground, or ground that is too steep to a neighbour."""
-    assert world.terrain is not None
-    x, y = (np.arange(-MARGIN, n - MARGIN) * CELL + low for n, low in zip(size, inside[:2], strict=True))
-    height = np.stack([world.ground_height(np.column_stack([x, np.full(len(x), row)])) for row in y])
-    off = np.isnan(height)
-    for axis in (0, 1):
-        here, there = off.swapaxes(0, axis)[:-1], off.swapaxes(0, axis)[1:]  # views: they change `off`
-        steep = world.terrain.is_too_steep(CELL, np.diff(height, axis=axis)).swapaxes(0, axis)
-        here |= steep
-        there |= steep
-    return off
-
-
-def _path_graph(grid: Float[np.ndarray, "rows columns"], inside: Bounds) -> tuple[Float[np.ndarray, "n 2"], csr_array]:
-    """Nodes (m) that are clear of obstacles, and the cost of going from one to a near one: its length, more where it is tight."""
-    rows, columns = np.mgrid[0 : grid.shape[0] : NODE_SPACING, 0 : grid.shape[1] : NODE_SPACING]
-    is_node = grid[::NODE_SPACING, ::NODE_SPACING] > MIN_CLEARANCE
-    number = np.where(is_node, np.arange(rows.size).reshape(rows.shape), -1)
-    pad = 2 * NODE_SPACING
-    padded = np.pad(grid, pad)  # no clearance outside
-    here, there, cost = [], [], []
-    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)):
-        between = [padded[rows + pad + down * s, columns + pad + right * s] for s in range(NODE_SPACING + 1)]
-        narrowest = np.minimum.reduce(between)
-        free = narrowest > MIN_CLEARANCE
-        here.append(number[free])
-        there.append(number[rows[free] // NODE_SPACING + down, columns[free] // NODE_SPACING + right])
-        length = NODE_SPACING * CELL * np.hypot(down, right)
-        cost.append(length * (1 + (PREFERRED_CLEARANCE / narrowest[free]) ** 2))
-    edges = (np.concatenate(cost), (np.concatenate(here), np.concatenate(there)))
-    graph = csr_array(edges, shape=(rows.size, rows.size))
-    connected = np.unique(np.concatenate(edges[1]))
-    xy = np.column_stack([columns.ravel(), rows.ravel()]) * CELL + np.array(inside[:2])
-    return xy[connected], graph[connected][:, connected]
-
-
 def _random_corners(
     inside: Bounds, length: float, rng: np.random.Generator, start: tuple[float, ...] | None = None
 ) -> Float[np.ndarray, "n 2"] | None:
@@ -201,23 +142,10 @@ def _random_corners(
     return corners[fits.argmax()] if fits.any() else None
 
 
-def _cheapest_path(corners: Float[np.ndarray, "n 2"], nodes, graph: csr_array) -> Float[np.ndarray, "k 2"] | None:
-    """The cheapest path over the nodes by way of each corner; None if there is none."""
-    stops = np.asarray(KDTree(nodes).query(corners)[1]).tolist()
-    cost, before = dijkstra(graph, directed=False, indices=stops[:-1], return_predecessors=True)
-    path = [stops[0]]
-    for leg, stop in enumerate(stops[1:]):
-        if not np.isfinite(cost[leg, stop]):
-            return None
-        backwards = [stop]
-        while backwards[-1] != stops[leg]:
-            backwards.append(before[leg, backwards[-1]])
-        path += backwards[-2::-1]
-    return nodes[path]
-
-
 def _smoothed(path: Float[np.ndarray, "k 2"], smoothing: float, length: float) -> Float[np.ndarray, "n 2"] | None:
     """The path, smoothed over about `smoothing` metres and cut to `length`; None if it is shorter."""
+    if len(path) < 2:  # all corners are nearest to one node
+        return None
     smooth = gaussian_filter1d(_resampled(path), smoothing / SPACING, axis=0, mode="nearest")
     route = _resampled(smooth)
     n = round(length / SPACING) + 1

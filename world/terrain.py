@@ -89,6 +89,26 @@ class Terrain:
                 np.maximum.at(highest[part], point, np.where(np.isnan(height), -np.inf, height))
         return np.where(np.isneginf(highest), np.nan, highest)
 
+    def height_on_grid(
+        self, x: Float[np.ndarray, " columns"], y: Float[np.ndarray, " rows"]
+    ) -> Float[np.ndarray, "rows columns"]:
+        """Heights as of `height` where columns x and rows y cross (m, ascending): each triangle is looked up once."""
+        highest = np.full(len(y) * len(x), -np.inf)
+        low, high = self._ground[..., :2].min(axis=1), self._ground[..., :2].max(axis=1)
+        left, right = np.searchsorted(x, low[:, 0], "left"), np.searchsorted(x, high[:, 0], "right")
+        bottom, top = np.searchsorted(y, low[:, 1], "left"), np.searchsorted(y, high[:, 1], "right")
+        width = right - left
+        count = width * (top - bottom)
+        first = count.cumsum() - count  # the points in the boxes of triangles, numbered one after the other
+        for start in range(0, int(count.sum()), BATCH):
+            number = np.arange(start, min(start + BATCH, int(count.sum())))
+            triangle = np.searchsorted(first, number, "right") - 1
+            row, column = np.divmod(number - first[triangle], width[triangle])
+            row, column = bottom[triangle] + row, left[triangle] + column
+            height = _height_in(self._ground[triangle], np.column_stack([x[column], y[row]]))
+            np.maximum.at(highest, row * len(x) + column, np.where(np.isnan(height), -np.inf, height))
+        return np.where(np.isneginf(highest), np.nan, highest).reshape(len(y), len(x))
+
     def is_too_steep(self, distance, rise):
         """Whether the ground is too steep between points some distance apart (m, over the x-y plane) that rises so much (m).
 
@@ -180,11 +200,12 @@ def _height_in(triangles: Float[np.ndarray, "n 3 3"], xy: Float[np.ndarray, "n 2
     area to the last bit, but for its sign, so a point at the edge is in one of them at least.
     """
     a, b, c = np.moveaxis(triangles[..., :2] - xy[:, None], 1, 0)
-    weights = np.column_stack([_cross(b, c), _cross(c, a), _cross(a, b)])
-    inside = (weights >= 0).all(axis=1) | (weights <= 0).all(axis=1)
-    total = weights.sum(axis=1)
+    u, v, w = _cross(b, c), _cross(c, a), _cross(a, b)
+    total = u + v + w
+    inside = (np.minimum(np.minimum(u, v), w) >= 0) | (np.maximum(np.maximum(u, v), w) <= 0)
     inside &= total != 0
-    height = (weights * triangles[..., 2]).sum(axis=1) / np.where(inside, total, 1.0)
+    z = triangles[..., 2]
+    height = (u * z[:, 0] + v * z[:, 1] + w * z[:, 2]) / np.where(inside, total, 1.0)
     return np.where(inside, height, np.nan)
 
 
