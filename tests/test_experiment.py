@@ -431,25 +431,15 @@ def test_with_another_eye_a_preset_encoding_keeps_its_number_of_columns():
 
 def test_an_experiment_walks_what_tussock_run_walks(tmp_path):
     experiment = Experiment(
-        world="tiny", seed=2, eye=Eye(width=180, height=40), model="infomax", start_offset=0.1,
+        world="tiny", seed=2, eye=Eye(width=60, height=12), route_length=2.0, model="infomax", start_offset=0.1,
         body=Body(heading_noise=math.radians(5)), stopping=StoppingRules(max_steps=20, put_back=True),
     )  # fmt: skip
     before = torch.get_num_threads()
-    flags = [
-        "--world",
-        "tiny",
-        "--seed",
-        "2",
-        "--size",
-        "180x40",
-        "--model",
-        "infomax",
-        "--offset-m",
-        "0.1",
-        "--heading-noise-deg",
-        "5",
-    ]
-    main(["run", *flags, "--max-steps", "20", "--on-lost", "reset", "--threads", "1", "--out", str(tmp_path / "run")])
+    flags = (
+        "--world tiny --seed 2 --size 60x12 --route-length-m 2 --model infomax --offset-m 0.1 --heading-noise-deg 5 "
+        "--max-steps 20 --on-lost reset --threads 1"
+    )
+    main(["run", *flags.split(), "--out", str(tmp_path / "run")])
     assert torch.get_num_threads() == before  # --threads is of this run alone
     assert experiment.replace(threads=1).run().to_csv() == (tmp_path / "run" / "trajectory.csv").read_text()
 
