@@ -95,23 +95,23 @@ def read_table(text: str, columns: list[str] | None = None) -> TextTable:
     kinds = [
         (separator, comma) for separator in SEPARATORS for comma in (False, True) if not (comma and separator == ",")
     ]
-    numeric = next((kind for kind in kinds if _is_numeric(_split(first, kind[0]), kind[1])), None)
+    numeric = next((kind for kind in kinds if _is_numeric(split_line(first, kind[0]), kind[1])), None)
     if numeric is not None:
         separator, comma = numeric
         header, line = columns, 0
         if columns is None and comments:  # names in the comment before the numbers, as numpy.savetxt writes them
             line = comments[-1]
             names = lines[line].strip().lstrip("#%/ \t")
-            header = next((cells for each in SEPARATORS if _has_xy(cells := _split(names, each))), None)
+            header = next((cells for each in SEPARATORS if _has_xy(cells := split_line(names, each))), None)
         begin = used[0]
     else:
-        separator = next((each for each in SEPARATORS if _has_xy(_split(first, each))), None)
+        separator = next((each for each in SEPARATORS if _has_xy(split_line(first, each))), None)
         if separator is None and columns is not None:  # names that mean nothing: as many as there are in the next line
             second = lines[used[1]] if len(used) > 1 else ""
-            separator = next((kind[0] for kind in kinds if _is_numeric(_split(second, kind[0]), kind[1])), None)
+            separator = next((kind[0] for kind in kinds if _is_numeric(split_line(second, kind[0]), kind[1])), None)
         separator = separator or ","
         line, begin = (used[0], used[0] + 1) if used else (0, 0)
-        header, comma = columns or _split(first, separator), False
+        header, comma = columns or split_line(first, separator), False
     rows, numbers = _rows(lines, begin, separator)
     if numeric is None:
         comma = separator != "," and any(re.fullmatch(r"[-+]?\d*,\d+", cell) for cells in rows[:100] for cell in cells)
@@ -123,7 +123,7 @@ def _rows(lines: list[str], begin: int, separator: str) -> tuple[list[list[str]]
     rows, numbers = [], []
     kept = ("" if line.lstrip().startswith(COMMENTS) else line for line in lines[begin:])
     if separator == " ":
-        cells_and_numbers = ((_split(line, " "), number) for number, line in enumerate(kept, begin + 1))
+        cells_and_numbers = ((split_line(line, " "), number) for number, line in enumerate(kept, begin + 1))
     else:
         reader = csv.reader((line + "\n" for line in kept), delimiter=separator, skipinitialspace=True)
         cells_and_numbers = ((cells, begin + reader.line_num) for cells in reader)
@@ -137,7 +137,7 @@ def _rows(lines: list[str], begin: int, separator: str) -> tuple[list[list[str]]
     return rows, numbers[: len(rows)]
 
 
-def _split(line: str, separator: str) -> list[str]:
+def split_line(line: str, separator: str) -> list[str]:
     """Cells of one line."""
     if separator == " ":
         return [cell.strip('"') for cell in WORD.findall(line)]
