@@ -332,6 +332,7 @@ def test_databases_that_cannot_be_used_are_refused_in_a_line(drawn, copies, tmp_
         ({"grid_database": grid}, "grid without a route"),
         ({"route_database": tmp_path / "none"}, "there is no .*none"),
         ({"route_database": grid}, "database of a grid"),
+        ({"route_database": route, "ground": "mesh"}, "ground is 'mesh'; give none with image databases"),
     ):
         with pytest.raises(InputError, match=words):
             Experiment(**settings).open_route(World.generate("tiny", 0))
