@@ -14,6 +14,9 @@ run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, an
 	@echo "    $(BIN)/tussock play run          (a window)"
 	@echo "    $(BIN)/tussock play run --web    (a browser, where there is no display)"
 
+# The tests start many processes: modules are compiled once, not by each of them, wherever that is switched off.
+test test-slow: export PYTHONDONTWRITEBYTECODE =
+
 test: $(VENV)/developer  ## the quick tests, on all cores
 	$(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder
 

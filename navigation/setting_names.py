@@ -1,26 +1,28 @@
 """The names of fields of settings in messages: those by which they were given, as flags of a command or keys of a sweep file."""
 
+import itertools
 from collections.abc import Collection
 
 from tussock.world.errors import FieldError, InputError
 
+from .settings_table import FIELDS
+
 # Classes whose fields are given by flags and keys; the fields of models and navigators are given as parameters, by their own names.
-OWNERS = (
-    "Surroundings", "Experiment", "MeshReading", "Eye", "TrainingSetup", "Body", "StoppingRules", "Scan", "Camera", "Ring",
-    "ImportSettings",
-)  # fmt: skip
-UNITS = ("", "_m", "_deg", "_s", "_px")  # at the end of a name
-RENAMED = {
-    "Eye.z": "eye_height_m",
-    "Body.step_length": "step_m",
-    "Experiment.start_offset": "offset_m",
-    "StoppingRules.arrival_radius": "arrive_m",
-    "StoppingRules.max_deviation": "lost_m",
-    "StoppingRules.waypoint_spacing": "waypoint_m",
-    "Scan.width": "scan_deg",
-    "Scan.about": "scan_about_deg",
-    "ImportSettings.height": "eye_height_m",
+CLASSES = {  # by the fields of `Experiment` that hold them
+    "": ("Surroundings", "Experiment"),
+    "reading": ("MeshReading",),
+    "eye": ("Eye",),
+    "training": ("TrainingSetup",),
+    "body": ("Body",),
+    "stopping": ("StoppingRules",),
 }
+OWNERS = {*itertools.chain(*CLASSES.values()), "Scan", "Camera", "Ring", "ImportSettings"}
+UNITS = ("", "_m", "_deg", "_s", "_px")  # at the end of a name
+NAMES = {  # of those that are not named after their field
+    f"{owner}.{field}": name
+    for name, (part, _, field) in ((name, place.rpartition(".")) for name, place in FIELDS.items())
+    for owner in CLASSES[part]
+} | {"Scan.width": "scan_deg", "Scan.about": "scan_about_deg", "ImportSettings.height": "eye_height_m"}
 PARTS = {  # given together by one name
     "Eye.width": "size",
     "Eye.height": "size",
@@ -44,7 +46,7 @@ def message_of(error: InputError, given: Collection[str], mark: str = "") -> str
     place = f"{error.owner}.{error.field}"
     if (whole := PARTS.get(place)) in given:
         return f"{mark}{whole}: {error.field} {error.problem}"
-    names = [RENAMED[place]] if place in RENAMED else [error.field + unit for unit in UNITS]
+    names = [NAMES[place]] if place in NAMES else [error.field + unit for unit in UNITS]
     name = next((each for each in names if each in given), None)
     if name is None:
         return str(error)

@@ -12,7 +12,7 @@ from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.meshes.reading import MeshReading
-from tussock.world.settings import choice, instance_of, number, settings, switch, text, whole
+from tussock.world.settings import choice, instance_of, number, refuse, settings, switch, text, whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,20 +26,20 @@ S = TypeVar("S", bound="Surroundings")
 
 BACKENDS = ("auto", "cpu", "egl", "osmesa")
 GROUNDS = ("flat", "mesh")
-OF_WORLDS = {
-    "world": "world",
-    "world_seed": "world-seed",
-    "reading": "up, --unit, --scale or --strict",
-    "ground": "ground",
-    "max_slope": "max-slope-deg",
-    "cull_back_faces": "cull-back-faces",
-    "route": "route",
-    "route_seed": "route-seed",
-    "route_length": "route-length-m",
-    "columns": "columns",
-    "smooth": "smooth-m",
-    "renderer": "renderer",
-}  # fields that databases do not take, and their flags
+OF_WORLDS = (
+    "world",
+    "world_seed",
+    "reading",
+    "ground",
+    "max_slope",
+    "cull_back_faces",
+    "route",
+    "route_seed",
+    "route_length",
+    "columns",
+    "smooth",
+    "renderer",
+)  # fields that databases do not take
 
 
 def _world(value: Any) -> Any:
@@ -148,12 +148,10 @@ class Surroundings:
                 f"{self.grid_database} is a grid without a route; give the image database of a route as well"
             )
         fields = attrs.fields_dict(type(self))
-        given = {name: getattr(self, name) for name in OF_WORLDS}
         usual = {name: fields[name].default for name in OF_WORLDS} | {"reading": MeshReading()}
-        if both := [name for name in OF_WORLDS if given[name] != usual[name]]:
-            raise SettingError(
-                f"--{OF_WORLDS[both[0]]} is of worlds, and image databases take their place; give one of the two"
-            )
+        for name in OF_WORLDS:
+            if (value := getattr(self, name)) != usual[name]:
+                refuse(self, fields[name], value, "none with image databases, which take the place of a world")
 
     def replace(self: S, **changes: Any) -> S:
         """The same with some fields changed; `body__heading_noise=0.1` changes a field of a field."""

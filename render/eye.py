@@ -66,8 +66,8 @@ class Eye:
                 f"give fewer pixels or samples",
             )
         if self.known is not None and not self.known.visible().any():
-            raise SettingError(
-                "Eye: known is black everywhere; give a picture that is white where images show the world"
+            raise FieldError(
+                "Eye", "", "known is black everywhere; give a picture that is white where images show the world"
             )
         if self.masked and not self.visible().any():
             raise FieldError(

@@ -26,6 +26,28 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 
 
+# A worker of pytest-xdist gets whole files, in this order: none is left alone with a long one at the end.
+LONGEST = [
+    "sweeps",
+    "fuzz",
+    "extending",
+    "gl_renderers",
+    "leaderboard",
+    "cli",
+    "database",
+    "protocols",
+    "models",
+    "experiment",
+]
+LONGEST += ["world_generation", "environment", "terrain_walks", "database_check", "fields", "docs"]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The files that take longest first, all others in their order."""
+    rank = {f"test_{name}": number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
+
+
 @pytest.fixture(scope="session")
 def sussex() -> Path:
     """The folder of the original world and routes."""

@@ -114,10 +114,14 @@ def answer(names: str | Path | None, ask: Callable[[], T]) -> T | None:
 
 
 def holds(examples: int) -> Callable[[Callable], Callable]:
-    """Decorator: register a property under its name, with the number of examples that it is tried on by default."""
+    """Decorator: register a property under its name, with the number of examples that it is tried on by default.
+
+    Those of a file that another one imports are left out: they are tried where that file runs.
+    """
 
     def enter(run: Callable) -> Callable:
-        PROPERTIES[run.__name__] = run, examples
+        if run.__module__ == "__main__":
+            PROPERTIES[run.__name__] = run, examples
         return run
 
     return enter

@@ -16,6 +16,7 @@ import torch
 import tyro
 from hypothesis import given
 from hypothesis import strategies as st
+from navigators import AHEAD
 
 from tussock.navigation.body import Body
 from tussock.navigation.cli.main import choice_of, commands_for, main
@@ -237,24 +238,11 @@ OTHER: dict[str, Any] = {
 }  # fmt: skip
 
 
-class Ahead:
-    """A navigator without a model that walks straight on."""
-
-    def learn(self, views):
-        pass
-
-    def begin(self):
-        return None
-
-    def decide(self, look, memories):
-        return Motion(turn=np.zeros(len(look)))
-
-
 def test_the_keys_differ_where_a_setting_differs(tmp_path):
     assert set(OTHER) == set(TYPES) - {"navigator", "route_database", "grid_database"}
     base = experiment_of({})
     others = {name: experiment_of({name: value}) for name, value in OTHER.items()}
-    others["navigator"] = experiment_of({"navigator": f"{__name__}:Ahead"})
+    others["navigator"] = experiment_of({"navigator": AHEAD})
     assert len({key_of(base), *map(key_of, others.values())}) == 1 + len(others)
     for key, names in ((route_key, {*ROUTE_SETTINGS, "seed"}), (training_key, set(TYPES) - set(WALK_SETTINGS))):
         assert {name for name, other in others.items() if key(other) != key(base)} == names - {
@@ -414,8 +402,8 @@ def test_the_command_of_a_run_repeats_it(given_settings):
 
 def test_the_command_names_only_what_is_not_as_by_default():
     assert run_command(Experiment(), "run") == "tussock run --out run"
-    ahead = experiment_of({"navigator": f"{__name__}:Ahead", "cull_back_faces": True, "offset_m": -0.1})
-    words = f"--cull-back-faces --offset-m -0.1 --navigator {__name__}:Ahead"
+    ahead = experiment_of({"navigator": AHEAD, "cull_back_faces": True, "offset_m": -0.1})
+    words = f"--cull-back-faces --offset-m -0.1 --navigator {AHEAD}"
     assert run_command(ahead, "run") == f"tussock run {words} --out run"
 
 
@@ -476,25 +464,15 @@ def test_with_another_eye_a_preset_encoding_keeps_its_number_of_columns():
 
 def test_an_experiment_walks_what_tussock_run_walks(tmp_path):
     experiment = Experiment(
-        world="tiny", seed=2, eye=Eye(width=180, height=40), model="infomax", start_offset=0.1,
+        world="tiny", seed=2, eye=Eye(width=60, height=12), route_length=2.0, model="infomax", start_offset=0.1,
         body=Body(heading_noise=math.radians(5)), stopping=StoppingRules(max_steps=20, put_back=True),
     )  # fmt: skip
     before = torch.get_num_threads()
-    flags = [
-        "--world",
-        "tiny",
-        "--seed",
-        "2",
-        "--size",
-        "180x40",
-        "--model",
-        "infomax",
-        "--offset-m",
-        "0.1",
-        "--heading-noise-deg",
-        "5",
-    ]
-    main(["run", *flags, "--max-steps", "20", "--on-lost", "reset", "--threads", "1", "--out", str(tmp_path / "run")])
+    flags = (
+        "--world tiny --seed 2 --size 60x12 --route-length-m 2 --model infomax --offset-m 0.1 --heading-noise-deg 5 "
+        "--max-steps 20 --on-lost reset --threads 1"
+    )
+    main(["run", *flags.split(), "--out", str(tmp_path / "run")])
     assert torch.get_num_threads() == before  # --threads is of this run alone
     assert experiment.replace(threads=1).run().to_csv() == (tmp_path / "run" / "trajectory.csv").read_text()
 
@@ -508,7 +486,7 @@ def test_progress_is_reported_while_it_walks():
 
 def test_a_navigator_without_a_model_walks(tmp_path):
     """One from outside: nothing is measured about learned views."""
-    experiment = experiment_of({"world": "tiny", "size": "60x12", "navigator": f"{__name__}:Ahead", "max_steps": 60})
+    experiment = experiment_of({"world": "tiny", "size": "60x12", "navigator": AHEAD, "max_steps": 60})
     trajectory = experiment.run()
     headings = {round(heading, 9) for heading in trajectory.column("heading_deg")}
     assert len(headings) == 1

@@ -2,6 +2,7 @@
 
 import errno
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -198,15 +199,20 @@ def test_damaged_worlds_are_refused(tmp_path, name, data, message):
         read_world(tmp_path / name)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.fixture(scope="module", params=SUFFIXES)
+def whole(request, tmp_path_factory) -> Path:
+    """The file of a world."""
+    path = tmp_path_factory.mktemp("whole") / f"w{request.param}"
+    write_world(World.generate("tiny", 1), path)
+    return path
+
+
 @given(share=st.floats(0.01, 0.99))
-def test_a_truncated_world_is_refused(tmp_path_factory, suffix, share):
-    folder = tmp_path_factory.mktemp("w")
-    write_world(World.generate("tiny", 1), folder / f"w{suffix}")
-    data = (folder / f"w{suffix}").read_bytes()
-    (folder / f"cut{suffix}").write_bytes(data[: int(share * len(data))])
+def test_a_truncated_world_is_refused(whole, share):
+    data, cut = whole.read_bytes(), whole.with_stem("cut")
+    cut.write_bytes(data[: int(share * len(data))])
     with pytest.raises(InputError, match="cut"):
-        read_world(folder / f"cut{suffix}")
+        read_world(cut)
 
 
 def test_missing_files_are_named(tmp_path):

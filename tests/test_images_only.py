@@ -279,17 +279,17 @@ def test_in_a_world_no_view_is_far(tmp_path):
     assert trajectory.summary()["max_view_distance_m"] is None
 
 
-def test_a_sweep_goes_over_databases(capfd, copies, tmp_path):
+def test_a_sweep_goes_over_databases(capfd, copies, cluster, tmp_path):
     sweep = tmp_path / "sweep.toml"
     sweep.write_text(
         '[fixed]\nroute-database = "route"\ngrid-database = "grid"\n[axes]\nmodel = ["perfect-memory", "random"]\n'
     )
     out = tmp_path / "out"
-    result = printed(capfd, "sweep", sweep, "--out", out, "--workers", 1)
+    result = printed(capfd, "sweep", sweep, "--out", out, "--scheduler", cluster)
     assert (result["runs"], result["arrived"], result["could_not_run"]) == (2, 1, 0)
     report = printed(capfd, "report", out)  # with the view and the map of the walk that failed
     assert "cannot" not in Path(report["report"]).read_text()
-    assert printed(capfd, "sweep", sweep, "--out", out, "--workers", 1)["done_before"] == 2
+    assert printed(capfd, "sweep", sweep, "--out", out, "--scheduler", cluster)["done_before"] == 2
 
 
 # Refusals, remarks and keys
@@ -332,6 +332,7 @@ def test_databases_that_cannot_be_used_are_refused_in_a_line(drawn, copies, tmp_
         ({"grid_database": grid}, "grid without a route"),
         ({"route_database": tmp_path / "none"}, "there is no .*none"),
         ({"route_database": grid}, "database of a grid"),
+        ({"route_database": route, "ground": "mesh"}, "ground is 'mesh'; give none with image databases"),
     ):
         with pytest.raises(InputError, match=words):
             Experiment(**settings).open_route(World.generate("tiny", 0))

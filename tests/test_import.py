@@ -100,6 +100,14 @@ def test_tables_of_any_columns_read_the_same(folder, tmp_path, name):
     assert check_database(tmp_path / "d") == []
 
 
+def test_names_separated_by_spaces_keep_their_units(tmp_path):
+    track = tmp_path / "t.txt"
+    track.write_text('x [mm]  y [mm]  filename\n1000 2000 "a 1.png"\n3000 2500 b.png\n')
+    read = read_track(track)
+    assert np.array_equal(read.poses[:, :2], [[1.0, 2.0], [3.0, 2.5]])
+    assert read.names == ["a 1.png", "b.png"]
+
+
 def test_columns_that_names_do_not_tell_are_given(folder, tmp_path):
     rows = [(i, *BEND[i], f"p{i}.png") for i in range(N)]
     track = table(tmp_path / "t.csv", "n,U,V,W,F", rows)

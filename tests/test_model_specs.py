@@ -178,22 +178,6 @@ def test_a_parameter_in_the_spec_is_not_given_as_a_keyword_too():
         make_model("rbm units=3", units=4)
 
 
-@pytest.mark.parametrize(
-    ("text", "parts"),
-    [
-        ("a,b", ["a", "b"]),
-        (" a , b c=1 ", ["a", "b c=1"]),
-        ("a x=(1,2),b", ["a x=(1,2)", "b"]),
-        ("a x=(1, 2) y=(3,4), b", ["a x=(1, 2) y=(3,4)", "b"]),
-        ("a x=1,2", ["a x=1", "2"]),
-        ("", [""]),
-        ("a,", ["a", ""]),
-    ],
-)
-def test_a_list_is_split_at_commas_outside_parentheses(text, parts):
-    assert split_list(text) == parts
-
-
 SMALL = ["--world", "tiny", "--size", "40x10", "--route-length-m", "1", "--spacing-m", "0.1"]
 
 

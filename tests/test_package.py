@@ -57,7 +57,8 @@ def test_a_users_own_files_of_the_same_names_do_not_matter(folder):
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    done = subprocess.run([sys.executable, "-m", "tussock", "models"], cwd=folder, capture_output=True, text=True)
+    command = [sys.executable, "-m", "tussock", "world", "--preset", "tiny", "--out", "w.glb"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 

@@ -1,17 +1,21 @@
 """Published protocols: the parameters of their sweeps, their measures by hand, and one replication from the command line."""
 
+import io
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from browser import WIDTHS, in_browser
+from commands import printed, process_json, tussock
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.encoding import Encoding
@@ -249,24 +253,12 @@ def test_azevedo_by_hand():
 
 
 @pytest.fixture(scope="module")
-def replication(tmp_path_factory) -> Path:
+def replication(tmp_path_factory, cluster) -> Path:
     out = tmp_path_factory.mktemp("protocols") / "kagioulis"
-    command = [
-        sys.executable,
-        "-m",
-        "tussock",
-        "replicate",
-        "kagioulis2024",
-        *TINY,
-        "--workers",
-        "2",
-        "--out",
-        str(out),
-        "--json",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+    output = io.StringIO()
+    with redirect_stdout(output):
+        main(["replicate", "kagioulis2024", *TINY, "--scheduler", cluster, "--out", str(out), "--json"])
+    result = json.loads(output.getvalue())
     assert (result["runs"], result["done_before"], result["could_not_run"]) == (4, 0, 0)
     assert set(result["claims"]) == {"sequence-lowers-error", "sequence-fails-less"}
     return out
@@ -434,19 +426,35 @@ def package(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-def replicate(*words, folder):
-    command = [sys.executable, "-m", "tussock", "replicate", *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
+@pytest.fixture
+def found(package, monkeypatch) -> Iterator[Path]:
+    """The same folder, also on the path of this process."""
+    monkeypatch.syspath_prepend(package)
+    monkeypatch.chdir(package)
+    monkeypatch.setattr(PROTOCOLS, "_registered", {})
+    vars(PROTOCOLS).pop("_installed", None)  # entry points are found once
+    yield package
+    vars(PROTOCOLS).pop("_installed", None)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "antlab"]:
+        del sys.modules[name]
 
 
-@pytest.mark.parametrize("name", ["nobody2030", "antlab.protocol:NOBODY2030"])
-def test_a_protocol_of_another_package_can_be_replicated(package, name):
-    done = replicate(name, "--quick", "--workers", "1", "--json", folder=package)
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
+def is_replicated(result: dict, name: str, folder: Path) -> None:
+    """Whether the command that printed a result has replicated the protocol of the package, under this name."""
     assert (result["runs"], result["claims"]["arrives"]["holds"]) == (1, "holds")
-    page = (package / "nobody2030" / "report.html").read_text(encoding="utf-8")
+    page = (folder / "nobody2030" / "report.html").read_text(encoding="utf-8")
     assert f"tussock replicate {name} --quick --out nobody2030" in page
+
+
+def test_a_protocol_of_another_package_can_be_replicated(package):
+    """Its workers find it as well."""
+    name = "nobody2030"
+    is_replicated(process_json("replicate", name, "--quick", "--workers", 1, cwd=package), name, package)
+
+
+def test_a_protocol_of_another_package_can_be_given_by_its_location(found, cluster, capfd):
+    name = "antlab.protocol:NOBODY2030"
+    is_replicated(printed(capfd, "replicate", name, "--quick", "--scheduler", cluster), name, found)
 
 
 def test_help_lists_every_protocol_with_its_sentence_and_imports_none(package):
@@ -476,11 +484,11 @@ def test_help_lists_every_protocol_with_its_sentence_and_imports_none(package):
         ("broken", ["broken", "antlab.gone", "repair"]),
     ],
 )
-def test_something_else_than_a_protocol_is_one_line(package, name, messages):
-    done = replicate(name, "--quick", folder=package)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert all(message in done.stderr for message in messages), done.stderr
+def test_something_else_than_a_protocol_is_one_line(found, capfd, name, messages):
+    code, _, err = tussock(capfd, "replicate", name, "--quick")
+    assert code == 2
+    assert len(err.splitlines()) == 1
+    assert all(message in err for message in messages), err
 
 
 def test_a_protocol_that_a_script_registers_is_a_command(monkeypatch, tmp_path, capsys):

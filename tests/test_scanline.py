@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+from renderer_laws import batches_and_threads_do_not_matter, low_resolution_is_the_mean_over_each_pixels_solid_angle
 from scenes import random_poses, random_world, world_of
 
 from tussock.render.eye import Eye
@@ -113,24 +114,11 @@ def test_a_mirrored_world_mirrors_the_view(renderer):
 
 
 def test_a_batch_equals_its_views_one_by_one_and_threads_do_not_matter(renderer):
-    poses = random_poses(7)
-    batch = renderer.render(poses)
-    assert all(np.array_equal(view, renderer.render([pose])[0]) for view, pose in zip(batch, poses, strict=True))
-    for threads in (1, 3, 5):
-        with ScanlineRenderer(renderer.world, renderer.eye, threads=threads) as other:
-            assert np.array_equal(other.render(poses), batch)
-            assert np.array_equal(other.render(poses[:1]), batch[:1])
+    batches_and_threads_do_not_matter(renderer)
 
 
 def test_low_resolution_is_the_mean_over_each_pixels_solid_angle():
-    world = random_world()
-    coarse, fine = Eye(width=60, height=20, samples=4, z=0.05), Eye(width=240, height=80, samples=1, z=0.05)
-    with open_renderer(world, coarse, "cpu") as low, open_renderer(world, fine, "cpu") as high:
-        for pose in random_poses(4):
-            weight = np.cos(fine.elevations()).reshape(20, 4, 1, 1, 1)
-            pixels = high.render([pose])[0].reshape(20, 4, 60, 4, 4) * weight
-            mean = pixels.sum(axis=(1, 3)) / (4 * weight.sum(axis=1))[:, 0]
-            assert np.abs(low.render([pose])[0] - mean).max() <= 0.5 + 1e-6
+    low_resolution_is_the_mean_over_each_pixels_solid_angle(random_world())
 
 
 def test_culling_shows_a_triangle_only_from_its_front():

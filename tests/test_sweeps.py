@@ -1,5 +1,6 @@
 """Sweeps: what a file asks for, the same table from any cluster, and nothing lost whatever is killed."""
 
+import io
 import json
 import os
 import shlex
@@ -12,7 +13,7 @@ import sys
 import time
 import zlib
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from browser import WIDTHS, in_browser
 from commands import TUSSOCK, printed, process_json, tussock
 from PIL import Image
 
+from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import key_of
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
@@ -61,6 +63,15 @@ def swept(tmp_path_factory) -> Path:
     result = process_json("sweep", written(folder, SWEEP), "--out", folder / "out", "--record", "worst:1")
     assert (result["runs"], result["done_before"], result["could_not_run"]) == (24, 0, 0)
     return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def reported(swept) -> dict:
+    """What the command that reports the sweep prints."""
+    output = io.StringIO()
+    with redirect_stdout(output):
+        main(["report", str(swept), "--json"])
+    return json.loads(output.getvalue())
 
 
 # Runs and their table
@@ -547,14 +558,11 @@ def test_a_scheduler_that_is_not_there_is_reported(capfd, tmp_path, monkeypatch)
 # Reports
 
 
-def test_the_report_of_a_sweep_stands_by_itself(swept):
-    done = subprocess.run([TUSSOCK, "report", swept, "--json"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
-    html = Path(result["report"]).read_text()
-    results = json.loads(Path(result["results"]).read_text())
-    assert result["runs"] == results["runs"] == 24
-    assert result["arrived"] == table(swept)["arrived"].mean()
+def test_the_report_of_a_sweep_stands_by_itself(swept, reported):
+    html = Path(reported["report"]).read_text()
+    results = json.loads(Path(reported["results"]).read_text())
+    assert reported["runs"] == results["runs"] == 24
+    assert reported["arrived"] == table(swept)["arrived"].mean()
     assert set(results["by"]) == {"model", "offset (m)", "seed"}
     for choices in results["by"].values():
         assert sum(choice["runs"] for choice in choices.values()) == 24
@@ -580,13 +588,12 @@ def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_a_browser_shows_the_report_without_errors(swept, tmp_path, width):
-    subprocess.run([TUSSOCK, "report", swept], capture_output=True, check=True)
-    shown = in_browser(swept / "report.html", width, tmp_path)
+def test_a_browser_shows_the_report_without_errors(reported, tmp_path, width):
+    shown = in_browser(Path(reported["report"]), width, tmp_path)
     assert shown == {"width": width, "wide": [], "broken": 0, "small": 0, "images": 3 + 2 * 5}
 
 
-def test_a_folder_without_a_sweep_has_no_report(tmp_path):
-    done = subprocess.run([TUSSOCK, "report", tmp_path], capture_output=True, text=True)
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert "holds no sweep" in done.stderr
+def test_a_folder_without_a_sweep_has_no_report(capfd, tmp_path):
+    code, _, messages = tussock(capfd, "report", tmp_path)
+    assert (code, len(messages.splitlines())) == (2, 1)
+    assert "holds no sweep" in messages

@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 import trimesh
 from commands import tussock
+from navigators import Ahead
 from scenes import hills, mesh_world, post, random_world, surface, world_of
 
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_settings import experiment_of
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.rl.task import Courses, RouteTask
-from tussock.navigation.steering.navigator import Motion
 from tussock.navigation.stopping import StoppingRules, StopReason
 from tussock.navigation.walk import Walk
 from tussock.render.eye import Eye
@@ -41,19 +41,6 @@ def posts_on_hills(up: float = 0.0):
     ground = hills() + (0, 0, up)
     feet = mesh_world(ground).on_mesh().ground_height(POSTS)
     return mesh_world(ground, *(post(*xy, z, 0.6) for xy, z in zip(POSTS.tolist(), feet.tolist(), strict=True)))
-
-
-class Ahead:
-    """A navigator that walks straight on."""
-
-    def learn(self, views):
-        pass
-
-    def begin(self):
-        return None
-
-    def decide(self, look, memories):
-        return Motion(turn=np.zeros(len(look)))
 
 
 def straight_walk(world, end: float = 20.0, **rules):

@@ -101,22 +101,24 @@ def read_table(text: str, columns: list[str] | None = None) -> TextTable:
     kinds = [
         (separator, comma) for separator in SEPARATORS for comma in (False, True) if not (comma and separator == ",")
     ]
-    numeric = next((kind for kind in kinds if _is_numeric(_split(first, kind[0]), kind[1])), None)
+    numeric = next((kind for kind in kinds if _is_numeric(split_line(first, kind[0]), kind[1])), None)
     if numeric is not None:
         separator, comma = numeric
         header, line = columns, 0
         if columns is None and comments:  # names in the comment before the numbers, as numpy.savetxt writes them
             line = comments[-1]
-            header = next((cells for each in SEPARATORS if _has_xy(cells := _split(_bare(lines[line]), each))), None)
+            header = next(
+                (cells for each in SEPARATORS if _has_xy(cells := split_line(_bare(lines[line]), each))), None
+            )
         return TextTable(header, line + 1, *_rows(lines, used[0], separator), comma)
     named = _named(lines, used, comments)
     line, separator = named or (used[0] if used else 0, None)
     if separator is None and columns is not None:  # names that mean nothing: as many as there are in the next line
         second = lines[used[1]] if len(used) > 1 else ""
-        separator = next((kind[0] for kind in kinds if _is_numeric(_split(second, kind[0]), kind[1])), None)
+        separator = next((kind[0] for kind in kinds if _is_numeric(split_line(second, kind[0]), kind[1])), None)
     separator = separator or ","
-    header = columns or _split(_bare(lines[line]), separator)
-    has_data = columns is not None and named is None and any(map(NUMBER.fullmatch, _split(first, separator)))
+    header = columns or split_line(_bare(lines[line]), separator)
+    has_data = columns is not None and named is None and any(map(NUMBER.fullmatch, split_line(first, separator)))
     rows, numbers = _rows(lines, line + (not has_data), separator)
     header, rows, numbers = _below_names(header, rows, numbers)
     if (
@@ -137,8 +139,8 @@ def _named(lines: list[str], used: list[int], comments: list[int]) -> tuple[int,
     """The line with names of columns, and their separator: the first line, the comment before it, or one below a text on the recording."""
     for number in [*used[:1], *comments[-1:], *used[1:MAX_PREAMBLE]]:
         for separator in SEPARATORS:
-            names = _split(_bare(lines[number]), separator)
-            if _has_xy(names) and (number in used or len(names) == len(_split(lines[used[0]], separator))):
+            names = split_line(_bare(lines[number]), separator)
+            if _has_xy(names) and (number in used or len(names) == len(split_line(lines[used[0]], separator))):
                 return number, separator
     return None
 
@@ -162,7 +164,7 @@ def _rows(lines: list[str], begin: int, separator: str) -> tuple[list[list[str]]
     rows, numbers = [], []
     kept = ("" if line.lstrip().startswith(COMMENTS) else line for line in lines[begin:])
     if separator == " ":
-        cells_and_numbers = ((_split(line, " "), number) for number, line in enumerate(kept, begin + 1))
+        cells_and_numbers = ((split_line(line, " "), number) for number, line in enumerate(kept, begin + 1))
     else:
         reader = csv.reader((line + "\n" for line in kept), delimiter=separator, skipinitialspace=True)
         cells_and_numbers = ((cells, begin + reader.line_num) for cells in reader)
@@ -176,7 +178,7 @@ def _rows(lines: list[str], begin: int, separator: str) -> tuple[list[list[str]]
     return rows, numbers[: len(rows)]
 
 
-def _split(line: str, separator: str) -> list[str]:
+def split_line(line: str, separator: str) -> list[str]:
     """Cells of one line."""
     if separator == " ":
         return [cell.strip('"') for cell in WORD.findall(line)]

@@ -39,8 +39,3 @@ def from_json(data: dict[str, Any]) -> dict[str, Any]:
         "origin": dict(data["origin"]),
         "origin_m": tuple(data.get("origin_m", (0.0, 0.0, 0.0))),
     }
-
-
-def is_y_up(data: Any) -> bool:
-    """Whether a glTF file has y up: all have, but for those that tussock wrote before it followed the standard."""
-    return not (isinstance(data, dict) and data.get("version") == 1)

@@ -18,7 +18,8 @@ from tussock.world.meshes.reading import MeshReading
 
 from ..body import Body
 from ..experiment import Experiment
-from ..experiment_settings import TYPES, degrees, experiment_of, surroundings_of
+from ..experiment_settings import TYPES, experiment_of, surroundings_of
+from ..settings_table import degrees
 from ..stopping import StoppingRules
 from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup

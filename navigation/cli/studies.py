@@ -9,7 +9,7 @@ import tyro
 
 from tussock.world.errors import SettingError
 
-from ..experiment_settings import degrees
+from ..settings_table import degrees
 from ..training_setup import ROUTE_SPACING
 from .options import RouteOptions, flags_of
 from .terminal import message, progress_of_parts

@@ -13,7 +13,7 @@ from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.headings import CONVENTIONS, convert, diagnose, of_radians
 from tussock.world.route_columns import LENGTHS, Column, as_of_database, chosen_column, find_columns, is_geographic
-from tussock.world.route_tables import COMMENTS, decode
+from tussock.world.route_tables import COMMENTS, decode, split_line
 
 from .pictures import check_content
 
@@ -136,14 +136,10 @@ def _table(path: Path, columns: str | None) -> tuple[list[str], list[list[str]],
     if not kept:
         raise FileError(f"{path} is empty; give a table of positions, with a row for each picture")
     separator = max((";", "\t", ","), key=lambda each: kept[0][1].count(each))
-    if separator not in kept[0][1]:
-        cells = [line.split() for _, line in kept]
-    else:
-        try:
-            cells = [next(csv.reader([line], delimiter=separator, skipinitialspace=True)) for _, line in kept]
-        except (csv.Error, StopIteration) as error:
-            raise FileError(f"{path} cannot be read as a table ({error}); repair it") from error
-    cells = [[cell.strip() for cell in row] for row in cells]
+    try:
+        cells = [split_line(line, separator if separator in kept[0][1] else " ") for _, line in kept]
+    except csv.Error as error:
+        raise FileError(f"{path} cannot be read as a table ({error}); repair it") from error
     if separator == ";":
         cells = [[re.sub(r"^([-+]?\d+),(\d+)$", r"\1.\2", cell) for cell in row] for row in cells]
     lines = [number for number, _ in kept]

@@ -15,7 +15,7 @@ from ..file_kinds import MAKE_A_MESH, mesh_format
 from ..geometry import Bounds
 from ..origin import origin_of, shown
 from ..scene import World
-from ..world_data import DEFAULT_SKY, KEY, from_json, is_y_up
+from ..world_data import DEFAULT_SKY, KEY, from_json
 from .appearance import appearance_of
 from .axes import turned_z_up
 from .gltf import prepared_gltf
@@ -24,7 +24,7 @@ from .ply import prepared_ply
 from .reading import MeshReading
 from .remarks import remarks_on_axes_and_units
 from .search import Neighbours
-from .upright import only_stands_with_z_up
+from .upright import axis_up
 
 log = logging.getLogger(__name__)
 
@@ -81,26 +81,8 @@ def read_mesh(path: Path, reading: MeshReading) -> World:
     if not meshes:
         raise FileError(f"{path} holds {_other_content(scene)}")
     _say_losses(path, file, reading)
-    up = "z"
-    if reading.up != "auto":
-        up = reading.up
-    elif file.kind in GLTF and is_y_up(file.own):
-        turned = file.own is None and _readable(path, lambda: _stands_with_z_up(path, meshes, reading))
-        up = "z" if turned else "y"
+    up = _readable(path, lambda: axis_up(path, meshes, reading, gltf=file.kind in GLTF, own=file.own))
     return _readable(path, lambda: _world(path, file, meshes, reading, up))
-
-
-def _stands_with_z_up(path: Path, meshes: list, reading: MeshReading) -> bool:
-    """Whether a glTF file is taken to have z up, against its standard; then it is said."""
-    corners = [np.asarray(mesh.vertices, dtype=np.float64)[mesh.faces].reshape(-1, 3) for mesh in meshes]
-    with np.errstate(all="ignore"):
-        taken = only_stands_with_z_up(corners, reading.metres)
-    if taken:
-        log.warning(
-            f"{path}: glTF has y up, but then nearly all of it would hang level in the air, and with z up it stands on the ground; "
-            "z is taken as up, and --up y takes the standard's axis"
-        )
-    return taken
 
 
 def _kind(path: Path, known: set[str]) -> str:
