@@ -28,6 +28,8 @@ from jaxtyping import Float, Float32, Float64, Int64
 from ..feature_mask import FeatureMask
 from .spectra import Spectra
 
+RESPONSES = 2**17  # that `Rotations` computes at once: they stay in the processor's cache
+
 Bank = TypeVar("Bank", bound="Rotations")
 
 
@@ -78,12 +80,12 @@ class FilterBank:
         if self._training is not None:  # products that torch can differentiate
             spectra, filters = torch.fft.rfft(views).permute(2, 0, 1), torch.fft.rfft(self._training).permute(2, 1, 0)
             return torch.fft.irfft(torch.bmm(spectra.conj(), filters), n=self._width, dim=0).movedim(0, 1)
-        responses = views.new_empty(len(views), self._width, len(self._spectra))
+        responses = views.new_empty(len(views), len(self._spectra), self._width)
         for view, first, (real, imaginary) in self._spectra.products(views):
-            for k, spectrum in enumerate(torch.complex(real, imaginary)):
-                some = torch.fft.irfft(spectrum.clone(), n=self._width, dim=0)
-                responses[view + k, :, first : first + some.shape[1]] = some
-        return responses
+            for k in range(len(real)):
+                some = torch.fft.irfft(torch.complex(real[k], imaginary[k]), n=self._width, dim=0).T
+                responses[view + k, first : first + len(some)] = some
+        return responses.mT
 
 
 class Rotations:
@@ -119,23 +121,26 @@ class Rotations:
 
     def responses(
         self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> Iterator[tuple[int, int, Float32[torch.Tensor, "w filters"]]]:
-        """Index of a view, index of a filter, and the responses of this and the next filters to the view; for all views and filters.
+    ) -> Iterator[tuple[slice, int, Float32[torch.Tensor, "views w filters"]]]:
+        """Which views, the index of a filter, and the responses of this and the next filters to the views; for all views and filters.
 
-        The rotations are in an order of their own: `responses[order]` has them as a view turns.
+        The rotations are in an order of their own: `responses[:, order]` has them as a view turns.
         """
         width, count = views.shape[2], len(self._even)
-        for view, first, (real, imaginary) in self._spectra.products(views, among):
+        for start, first, (real, imaginary) in self._spectra.products(views, among):
             if self._biases is not None:  # frequency 0 adds to all rotations alike
                 real[:, 0] += width * self._biases[first : first + real.shape[2]]
-            even, odd = torch.empty_like(real[0]), torch.empty_like(real[0])
-            responses = real.new_empty(width, real.shape[2])
-            for k in range(len(real)):
-                torch.mm(self._even, real[k], out=even)
-                torch.mm(self._odd, imaginary[k], out=odd)
-                torch.add(even, odd, out=responses[:count])
-                torch.sub(even[self._right], odd[self._right], out=responses[count:])
-                yield view + k, first, responses
+            size = max(1, RESPONSES // (width * real.shape[2]))
+            for part, (reals, imaginaries) in enumerate(zip(real.split(size), imaginary.split(size), strict=True)):
+                even, odd = torch.empty_like(reals), torch.empty_like(imaginaries)
+                for k in range(len(reals)):  # one by one, to the same bytes as alone
+                    torch.mm(self._even, reals[k], out=even[k])
+                    torch.mm(self._odd, imaginaries[k], out=odd[k])
+                responses = torch.empty(len(even), width, even.shape[2], device=views.device)
+                torch.add(even, odd, out=responses[:, :count])
+                torch.sub(even[:, self._right], odd[:, self._right], out=responses[:, count:])
+                view = start + part * size
+                yield slice(view, view + len(even)), first, responses
 
 
 class NearestFilters(Rotations):
@@ -156,16 +161,16 @@ class NearestFilters(Rotations):
         n, width = len(views), views.shape[2]
         least = views.new_full((n, width), torch.inf)
         index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
-        for view, first, responses in self.responses(views, among):
+        for some, first, responses in self.responses(views, among):
             values, which = _least(responses)
-            less = values < least[view]
-            least[view] = values.where(less, least[view])
-            index[view] = (first + which).where(less, index[view])
+            less = values < least[some]
+            least[some] = values.where(less, least[some])
+            index[some] = (first + which).where(less, index[some])
         return least[:, self.order], index[:, self.order]
 
 
-def _least(responses: Float32[torch.Tensor, "w m"]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Least response over the filters (w,), and its index. On a CPU by numpy, whose argmin is faster than torch's."""
+def _least(responses: Float32[torch.Tensor, "n w m"]) -> tuple[torch.Tensor, torch.Tensor]:
+    """Least response over the filters (n, w), and its index. On a CPU by numpy, whose argmin is faster than torch's."""
     on_cpu = responses.device.type == "cpu"
-    index = torch.from_numpy(responses.numpy().argmin(axis=1)) if on_cpu else responses.argmin(dim=1)
-    return responses.gather(1, index[:, None])[:, 0], index
+    index = torch.from_numpy(responses.numpy().argmin(axis=2)) if on_cpu else responses.argmin(dim=2)
+    return responses.gather(2, index[..., None])[..., 0], index

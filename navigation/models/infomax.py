@@ -109,8 +109,8 @@ class Infomax(IncrementalModel):
             return -sum(bank.responses(views).abs_().sum(dim=2) for bank in self._banks)  # type: ignore[return-value]
         self._rotations = self._rotations or Rotations(weights)
         activity = torch.zeros(len(views), views.shape[2], device=views.device)
-        for view, _, inputs in self._rotations.responses(views):
-            activity[view] += inputs.abs_().sum(dim=1)
+        for some, _, inputs in self._rotations.responses(views):
+            activity[some] += inputs.abs_().sum(dim=2)
         return -activity[:, self._rotations.order]
 
 

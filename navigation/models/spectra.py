@@ -50,7 +50,7 @@ class Spectra:
         for block in (filters[:space], *filters[space:].split(self.size)):
             if len(block) == 0:
                 continue
-            transformed = _rows(torch.fft.rfft(block)).mT  # (f, 2 h, m)
+            transformed = _columns(torch.fft.rfft(block))
             if space:
                 self._blocks[-1] = self._blocks[-1].appended(transformed)
             else:
@@ -86,6 +86,13 @@ def _rows(spectra: torch.Tensor) -> Float[torch.Tensor, "f n parts"]:
     """Real and imaginary parts of all rows of spectra (n, h, f), then as many 0 as make their number a multiple of TERMS."""
     parts = torch.view_as_real(spectra).permute(2, 0, 1, 3).flatten(2)
     return torch.nn.functional.pad(parts, (0, -parts.shape[2] % TERMS))
+
+
+def _columns(spectra: torch.Tensor) -> Float[torch.Tensor, "f parts m"]:
+    """The same for filters, (m, h, f), with one of them a column. Much faster in two steps, of which the first is a plain transposition."""
+    parts = torch.view_as_real(spectra)  # (m, h, f, 2)
+    transposed = parts.flatten(1).T.contiguous().unflatten(0, parts.shape[1:]).transpose(0, 1)  # (f, h, 2, m)
+    return torch.nn.functional.pad(transposed.flatten(1, 2), (0, 0, 0, -2 * parts.shape[1] % TERMS))
 
 
 def _multiplied(rows: torch.Tensor, filters: torch.Tensor, first: int, last: int) -> torch.Tensor:
