@@ -123,7 +123,9 @@ class FeatureMask:
     def _sums(self, images: Float64[torch.Tensor, "n h w"]) -> Float64[torch.Tensor, "n w"]:
         """Sum over the visible pixels of images at each rotation, by the correlation theorem."""
         mask = torch.fft.rfft(self.visible.to(images.device).double())
-        return torch.fft.irfft((torch.fft.rfft(images).conj() * mask).sum(dim=1), n=images.shape[2])
+        width = images.shape[2]
+        sums = [torch.fft.irfft((torch.fft.rfft(each.clone()).conj() * mask).sum(dim=0), n=width) for each in images]
+        return torch.stack(sums)  # one by one, so that a view has the same sums, to the last bit, alone as among others
 
 
 def energies(views: Float[torch.Tensor, "n h w"], mask: FeatureMask | None) -> Float[torch.Tensor, "n rotations"]:

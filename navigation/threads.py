@@ -1,7 +1,9 @@
 """How many threads torch and the libraries of linear algebra work on, for a while."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from itertools import pairwise
 from threading import Lock
 
 import torch
@@ -24,6 +26,16 @@ def threads(count: int | None) -> Iterator[None]:
 
 
 _lock, _inside, _before = Lock(), 0, 1
+
+
+def in_threads(work: Callable[[int, int], None], items: int, count: int) -> None:
+    """Call `work(begin, end)` for as many parts of `items` as there are threads, at the same time."""
+    if count == 1:
+        return work(0, items)
+    edges = [items * part // count for part in range(count + 1)]
+    with ThreadPoolExecutor(count) as pool:
+        list(pool.map(lambda part: work(*part), pairwise(edges)))
+    return None
 
 
 @contextmanager

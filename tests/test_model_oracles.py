@@ -30,7 +30,7 @@ from tussock.navigation.models import (
     PerfectMemory,
     RandomHeadings,
     VisualCompass,
-    filter_bank,
+    spectra,
 )
 from tussock.navigation.models.adaboost import best_stump, haar_filters
 from tussock.navigation.models.base import SequenceModel, SnapshotModel
@@ -82,8 +82,8 @@ def test_snapshot_models_give_the_view_that_they_recognised(make):
 def test_snapshots_compared_in_blocks_give_the_same_matches(monkeypatch):
     learned = views(30)
     scan, match = PerfectMemory().fit(learned).match(learned)
-    monkeypatch.setattr(filter_bank, "FILTERS", 4)
-    monkeypatch.setattr(filter_bank, "VIEWS", 7)
+    monkeypatch.setattr(spectra, "FILTERS", 4)
+    monkeypatch.setattr(spectra, "VIEWS", 7)
     scan_of_blocks, match_of_blocks = PerfectMemory().fit(learned).match(learned)
     assert torch.allclose(scan_of_blocks, scan, atol=1e-4)
     assert torch.equal(match_of_blocks, match)

@@ -10,9 +10,11 @@ from jaxtyping import TypeCheckError
 from scenes import views
 from small_models import small
 
+from tussock.navigation.feature_mask import FeatureMask
 from tussock.navigation.models import MODELS, OPPONENT, make_model
-from tussock.navigation.models.base import FamiliarityModel, IncrementalModel, Model, memory_bytes
+from tussock.navigation.models.base import FamiliarityModel, Model, memory_bytes
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
+from tussock.navigation.models.incremental import IncrementalModel
 from tussock.world.errors import InputError, SettingError
 
 REFUSED = (InputError, TypeCheckError)  # with type checking on, as here, a wrong rank does not reach our own check
@@ -182,6 +184,40 @@ def test_learning_in_parts_equals_learning_at_once(name, trained):
         assert in_parts.partial_fit(views(12)[part]) is in_parts
     assert same(in_parts, trained)
     assert same(small(name).fit(views(12)[:4]).partial_fit(views(12)[4:]), trained)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if base(name) in INCREMENTAL])
+@pytest.mark.parametrize("make_copy", [copy.copy, copy.deepcopy])
+def test_learning_on_changes_no_copy(name, make_copy):
+    model = small(name).fit(views(5))
+    model.partial_fit(views(1, 7)).partial_fit(views(1, 8))  # by now it may change its own tensors in place
+    copied, twin = make_copy(model), make_copy(model)
+    model.partial_fit(views(1, 1)).partial_fit(views(1, 2))
+    after = state(model)
+    copied.partial_fit(views(1, 3)).partial_fit(views(1, 4))
+    assert state(model) == after != state(copied)
+    expected = small(name).fit(torch.cat([views(5), views(1, 7), views(1, 8)]))
+    assert same(twin, expected)
+    assert same(copied, expected.partial_fit(torch.cat([views(1, 3), views(1, 4)])))
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if base(name) in INCREMENTAL])
+def test_learning_on_changes_no_tensor_that_was_given_out(name):
+    model = small(name).fit(views(5)).partial_fit(views(1, 7)).partial_fit(views(1, 8))
+    held = dict(model.learned)
+    before = state(model)
+    model.partial_fit(views(1, 1)).partial_fit(views(1, 2))
+    assert {key: tensor.numpy().tobytes() for key, tensor in held.items()} == before != state(model)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if base(name) in INCREMENTAL])
+@pytest.mark.parametrize("masked", [False, True])
+def test_a_view_learned_between_scans_is_learned_as_among_others(name, masked):
+    mask = FeatureMask(torch.arange(24).expand(5, 24) > 8) if masked else None
+    model, at_once = small(name).see(mask), small(name).see(mask).fit(views(12))
+    for view in views(12).split(1):
+        model.partial_fit(view).scan(view)
+    assert same(model, at_once)
 
 
 def test_incremental_models_have_partial_fit(name):

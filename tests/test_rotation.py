@@ -6,7 +6,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tussock.navigation.models import filter_bank
+from tussock.navigation.models import spectra
 from tussock.navigation.models.filter_bank import FilterBank, NearestFilters
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.world.errors import InputError
@@ -45,8 +45,8 @@ def test_the_nearest_filter_is_the_one_with_the_least_response(size, seed, data)
     among = slice(first, data.draw(st.integers(first + 1, m)))
     views, filters, biases = random_images(n, h, w, seed), random_images(m, h, w, seed + 1), torch.arange(float(m))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(filter_bank, "FILTERS", data.draw(st.integers(1, m)))
-        patch.setattr(filter_bank, "VIEWS", data.draw(st.integers(1, n)))
+        patch.setattr(spectra, "FILTERS", data.draw(st.integers(1, m)))
+        patch.setattr(spectra, "VIEWS", data.draw(st.integers(1, n)))
         least, index = NearestFilters(filters, biases).nearest(views, among)
     expected = by_rolling(views, filters, biases)
     assert torch.allclose(least.double(), expected[..., among].amin(dim=2), atol=1e-4)

@@ -78,8 +78,9 @@ class TrainCommand(ModelOptions):
 
         from tussock.world.atomic import check_writable
 
-        from ..models.base import IncrementalModel, memory_bytes
+        from ..models.base import memory_bytes
         from ..models.files import TrainedModel, check_can_be_saved, load_model, save_model
+        from ..models.incremental import IncrementalModel
         from ..threads import threads
         from ..training import training_views
 

@@ -13,7 +13,7 @@ from tussock.world.settings import number, numbers, whole
 
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .filter_bank import FilterBank
-from .rotations import in_batches
+from .rotations import in_batches, one_by_one
 
 NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a stump is searched
 THRESHOLDS = 63  # that are tried for a filter: quantiles of its responses
@@ -115,7 +115,7 @@ class AdaBoost(Model):
 def sum_of_votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:
     """Sum of the votes of all stumps at each rotation."""
     answers = (bank.responses(views) > learned["cuts"]).float() * 2 - 1
-    return answers @ learned["votes"]
+    return one_by_one(lambda answers: answers @ learned["votes"], answers)
 
 
 class Stump(NamedTuple):

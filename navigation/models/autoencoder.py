@@ -1,11 +1,13 @@
 """An autoencoder: views that it cannot reconstruct are unfamiliar."""
 
 import torch
+from jaxtyping import Float32
 
 from tussock.world.settings import number, whole
 
 from ..feature_mask import energies
 from .base import Images, Learned, Model, Scans, Shapes, model
+from .rotations import one_by_one
 
 
 @model
@@ -70,6 +72,10 @@ class Autoencoder(Model):
         drive, bias = responses[..., :-1], responses[..., -1]
         h = torch.tanh(drive + self.learned["hidden"])
         product = (h * drive).sum(dim=2) + bias
-        energy = (h * (h @ self._overlap)).sum(dim=2) + 2 * (h @ self._projection) + self._energy
+        energy = one_by_one(self._energies, h)
         squared = energies(views, self.mask) - 2 * product + energy
         return -(squared.clamp(min=0) / self._size(*views.shape[1:])).sqrt().float()
+
+    def _energies(self, h: Float32[torch.Tensor, "w units"]) -> Float32[torch.Tensor, " w"]:
+        """|r|^2 of the reconstructions."""
+        return (h * (h @ self._overlap)).sum(dim=1) + 2 * (h @ self._projection) + self._energy

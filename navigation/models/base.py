@@ -106,7 +106,6 @@ class Model(ABC):
     Attributes:
         device: Where it learns and scans, as torch names devices ("cpu", "cuda").
         seed: Of everything it draws.
-        learned: Named tensors. Together with the parameters they are what a model file holds.
         shape: (h, w) of the views it learned; None before training.
         mask: What it sees of views; None means everything (see `see`).
         name: Its name in messages; for the models of tussock, that in the registry.
@@ -126,12 +125,19 @@ class Model(ABC):
 
     device: str = instance_of(str, "cpu", "the name of a device")
     seed: int = whole(0, low=0)
-    learned: Learned = attrs.field(init=False, repr=False, factory=dict)
+    _learned: Learned = attrs.field(init=False, repr=False, factory=dict)
+    _lent: bool = attrs.field(init=False, repr=False, default=True)
     shape: tuple[int, int] | None = attrs.field(init=False, repr=False, default=None)
     mask: FeatureMask | None = attrs.field(init=False, repr=False, default=None)
 
     def __init_subclass__(cls) -> None:
         cls.name = vars(cls).get("name", cls.__name__)
+
+    def __copy__(self: Self) -> Self:
+        copied = object.__new__(type(self))
+        self._lent = True
+        vars(copied).update(vars(self))
+        return copied
 
     def __str__(self) -> str:
         """Its spec: the name, and the parameters that are not the defaults."""
@@ -194,14 +200,20 @@ class Model(ABC):
         """
         self.check_learned(shape, learned)
         restored = copy.copy(self)
-        restored.learned, restored.shape = {key: self._on_device(tensor) for key, tensor in learned.items()}, shape
+        restored._learned, restored.shape = {key: self._on_device(tensor) for key, tensor in learned.items()}, shape
         restored._prepare()
         vars(self).update(vars(restored))
 
     @property
+    def learned(self) -> Learned:
+        """Named tensors. Together with the parameters they are what a model file holds. They stay as they are when it learns more."""
+        self._lent = True
+        return self._learned
+
+    @property
     def memory_bytes(self) -> int:
         """Size of what it has learned."""
-        return sum(tensor.nbytes for tensor in self.learned.values())
+        return sum(tensor.nbytes for tensor in self._learned.values())
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -210,6 +222,15 @@ class Model(ABC):
 
     def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
         """Refuse what a model with these parameters cannot have learned from views of a shape. Raises SettingError."""
+        self._check_form(shape, learned)
+        for key, tensor in learned.items():
+            if tensor.is_floating_point() and not all_bounded(tensor, is_partial(self.mask)):
+                raise SettingError(
+                    f"{self.name}: the {key} are not finite, or over {MAX_VALUE:g}; if they grew without bound, give a lower rate"
+                )
+
+    def _check_form(self, shape: tuple[int, int], learned: Learned) -> None:
+        """Refuse tensors of other names, shapes and types."""
         if self.mask is not None:
             self.mask.check(shape)
         if shape[1] > MAX_COLUMNS:
@@ -225,10 +246,6 @@ class Model(ABC):
                 raise SettingError(f"{self.name}: {key} has shape {tuple(tensor.shape)}, not {expected[key]}")
             if (dtype := self.dtypes.get(key, torch.float32)) not in (None, tensor.dtype):
                 raise SettingError(f"{self.name}: {key} has type {tensor.dtype}, not {dtype}")
-            if tensor.is_floating_point() and not all_bounded(tensor, is_partial(self.mask)):
-                raise SettingError(
-                    f"{self.name}: the {key} are not finite, or over {MAX_VALUE:g}; if they grew without bound, give a lower rate"
-                )
 
     def _on_device(self, tensor: torch.Tensor) -> torch.Tensor:
         return tensor.to(self.device)
@@ -273,27 +290,3 @@ class Model(ABC):
 
     def _prepare(self) -> None:  # noqa: B027  # most models need nothing
         """Derive from `learned` what scanning needs. Attributes are replaced, never changed in place (see `restore`)."""
-
-
-class IncrementalModel(Model):
-    """A model that learns view by view, and goes on learning at any time."""
-
-    def partial_fit(self: Self, views: Images) -> Self:
-        """Learn further views of the same shape on top of what it knows; where that fails, the model stays as it was."""
-        if self.shape is None:
-            return self.fit(views)
-        check_training(views, is_partial(self.mask))
-        check_scan(views, self.shape, is_partial(self.mask))
-        self.restore(self.shape, self._add(self.learned, self._on_device(views)))  # type: ignore[attr-defined]
-        return self
-
-    def _learn(self, views: Images) -> Learned:
-        return self._add(self._begin(views.shape[1], views.shape[2]), views)
-
-    @abstractmethod
-    def _begin(self, height: int, width: int) -> Learned:
-        """What it knows before the first view."""
-
-    @abstractmethod
-    def _add(self, learned: Learned, views: Images) -> Learned:
-        """`learned`, which stays as it is, with views added one after the other."""

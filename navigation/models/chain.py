@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float32, Int64
 from tussock.world.settings import number
 
 from ..feature_mask import energies
-from .base import model
+from .base import Images, model
 from .checks import check_scan
 from .filter_bank import FilterBank
 from .perfect_memory import PerfectMemory
@@ -40,8 +40,18 @@ class Chain(PerfectMemory):
         """Begin a walk along the chain, with unknown progress."""
         return ChainWalk(self)
 
-    def _prepare(self) -> None:
-        super()._prepare()
+    def _compare(self, snapshots: Images) -> None:
+        super()._compare(snapshots)
+        self._max_difference: float | None = None
+
+    @property
+    def max_difference(self) -> float:
+        """Largest RMS difference of a match."""
+        if self._max_difference is None:
+            self._max_difference = self._difference_between_positions()
+        return self._max_difference
+
+    def _difference_between_positions(self) -> float:
         pick = torch.linspace(0, len(self.snapshots) - 1, min(SAMPLE, len(self.snapshots))).round().long()
         sample = self.snapshots[pick] - (self._level if self.mask is None else 0)
         squares = energies(sample, None)
@@ -51,7 +61,7 @@ class Chain(PerfectMemory):
         pairs = torch.triu_indices(len(sample), len(sample), 1).unbind()
         squared = (squares + squares[:, 0] - 2 * correlation)[pairs]
         rms = (squared.clamp(min=0) / self._size(*sample.shape[1:])).sqrt()
-        self.max_difference = self.max_mismatch * float(rms.median()) if len(rms) else np.inf  # RMS
+        return self.max_mismatch * float(rms.median()) if len(rms) else np.inf
 
 
 class ChainWalk:

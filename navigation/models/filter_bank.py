@@ -9,25 +9,28 @@ By the correlation theorem its Fourier transform along azimuth is, at each frequ
 
     R = sum over rows i of conj(V[i]) F[i]
 
-so all views meet all filters in one small product of matrices per frequency. `FilterBank` is just this. `NearestFilters` finds the
-filter with the least response, faster where filters or views are many.
+so all views meet all filters in one small product of matrices per frequency (`Spectra`). `FilterBank` is just this. `Rotations` gives
+the same, faster where filters are many, and `NearestFilters` finds the filter with the least response.
 
 A mask stands still with the eye: it is part of the filters (see `FeatureMask`), and what it hides makes no difference.
 
-The same views give the same bytes on the same machine with the same number of threads. With other threads, or in other batches,
-responses agree within 1e-6 sqrt(w) |V| |F| (rounding).
+A view gives the same bytes alone as among others, on the same machine with the same number of threads. With other threads responses
+agree within 1e-6 sqrt(w) |V| |F| (rounding).
 """
 
+import copy
 from collections.abc import Iterator
+from typing import TypeVar
 
 import torch
 from jaxtyping import Float, Float32, Float64, Int64
 
 from ..feature_mask import FeatureMask
+from .spectra import Spectra
 
-# Filters, and views, that `NearestFilters` takes at once: what is computed on the way then stays in the processor's cache
-# (measured on an AMD EPYC with 1 MB of it per core).
-FILTERS, VIEWS = 1000, 8
+RESPONSES = 2**17  # that `Rotations` computes at once: they stay in the processor's cache
+
+Bank = TypeVar("Bank", bound="Rotations")
 
 
 class FilterBank:
@@ -49,7 +52,18 @@ class FilterBank:
         if mask is not None:
             filters = filters.double() * mask.visible.to(filters.device)
             self._sums = filters.sum(dim=(1, 2))
-        self._spectra = torch.fft.rfft(filters).permute(2, 1, 0).contiguous()  # (f, h, m)
+        self._training = filters if filters.requires_grad else None
+        if self._training is None:
+            self._spectra = Spectra(filters)
+
+    def appended(self, filters: Float32[torch.Tensor, "m h w"]) -> "FilterBank":
+        """These filters and then others, without biases; this object stays as it is."""
+        grown = copy.copy(self)
+        if self._mask is not None:
+            filters = filters.double() * self._mask.visible.to(filters.device)
+            grown._sums = torch.cat([self._sums, filters.sum(dim=(1, 2))])
+        grown._spectra = self._spectra.appended(filters)
+        return grown
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
         """Response of each filter to each rotation of each view."""
@@ -63,34 +77,74 @@ class FilterBank:
         return (self._correlated(views.double()) - mean[..., None] * self._sums) * factor[..., None]
 
     def _correlated(self, views: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "n w m"]:
-        spectra = torch.fft.rfft(views).permute(2, 0, 1)  # (f, n, h)
-        products = torch.bmm(spectra.conj(), self._spectra)  # (f, n, m)
-        return torch.fft.irfft(products, n=self._width, dim=0).movedim(0, 1)
+        if self._training is not None:  # products that torch can differentiate
+            spectra, filters = torch.fft.rfft(views).permute(2, 0, 1), torch.fft.rfft(self._training).permute(2, 1, 0)
+            return torch.fft.irfft(torch.bmm(spectra.conj(), filters), n=self._width, dim=0).movedim(0, 1)
+        responses = views.new_empty(len(views), len(self._spectra), self._width)
+        for view, first, (real, imaginary) in self._spectra.products(views):
+            for k in range(len(real)):
+                some = torch.fft.irfft(torch.complex(real[k], imaginary[k]), n=self._width, dim=0).T
+                responses[view + k, first : first + len(some)] = some
+        return responses.mT
 
 
-class NearestFilters:
-    """Finds the filter with the least response to each rotation of a view.
+class Rotations:
+    """Responses of many filters to all rotations, one view after the other.
 
-    The responses are those of a `FilterBank`. For batches it takes half the time: products are real, and a response is split into
-    what is even in the rotation (the inverse transform of the real parts of R) and what is odd (that of the imaginary parts). As
-    r[k] = even[k] + odd[k] and r[-k] = even[k] - odd[k], half of the rotations need an inverse transform, as a product of matrices.
+    They are those of a `FilterBank`, found faster: products are real, and a response is split into what is even in the rotation (the
+    inverse transform of the real parts of R) and what is odd (that of the imaginary parts). As r[k] = even[k] + odd[k] and
+    r[-k] = even[k] - odd[k], half of the rotations need an inverse transform, as a product of matrices.
 
     Args:
         filters: (m, h, w)
-        biases: (m,) Added to the responses.
+        biases: (m,) Added to the responses; None means none.
     """
 
-    def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]):
-        self._width = width = filters.shape[2]
+    def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
+        width = filters.shape[2]
+        self._spectra, self._biases = Spectra(filters), biases
         count = width // 2 + 1
         identity = torch.eye(count, dtype=torch.float64, device=filters.device)
         self._even = torch.fft.irfft(identity, n=width, dim=0)[:count].float()
         self._odd = torch.fft.irfft(1j * identity, n=width, dim=0)[:count].float()
-        self._left = torch.arange(count, device=filters.device)  # rotations 0, 1, .. w // 2
-        self._right = -self._left % width  # and the same to the right
-        # Blocks of (f, 2 h, m).
-        self._filters = [_parts(torch.fft.rfft(block)).mT.contiguous() for block in filters.split(FILTERS)]
-        self._biases = biases.split(FILTERS)
+        self._right = slice(1, (width + 1) // 2)
+        # Rotations 0, 1, .. w // 2 come first, then as many to the right: where each rotation stands.
+        rotation = torch.arange(width, device=filters.device)
+        self.order = torch.where(rotation < count, rotation, count - 1 + width - rotation)
+
+    def appended(self: Bank, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> Bank:
+        """These filters and then others, all with biases; this object stays as it is."""
+        assert self._biases is not None
+        grown = copy.copy(self)
+        grown._spectra, grown._biases = self._spectra.appended(filters), torch.cat([self._biases, biases])
+        return grown
+
+    def responses(
+        self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
+    ) -> Iterator[tuple[slice, int, Float32[torch.Tensor, "views w filters"]]]:
+        """Which views, the index of a filter, and the responses of this and the next filters to the views; for all views and filters.
+
+        The rotations are in an order of their own: `responses[:, order]` has them as a view turns.
+        """
+        width, count = views.shape[2], len(self._even)
+        for start, first, (real, imaginary) in self._spectra.products(views, among):
+            if self._biases is not None:  # frequency 0 adds to all rotations alike
+                real[:, 0] += width * self._biases[first : first + real.shape[2]]
+            size = max(1, RESPONSES // (width * real.shape[2]))
+            for part, (reals, imaginaries) in enumerate(zip(real.split(size), imaginary.split(size), strict=True)):
+                even, odd = torch.empty_like(reals), torch.empty_like(imaginaries)
+                for k in range(len(reals)):  # one by one, to the same bytes as alone
+                    torch.mm(self._even, reals[k], out=even[k])
+                    torch.mm(self._odd, imaginaries[k], out=odd[k])
+                responses = torch.empty(len(even), width, even.shape[2], device=views.device)
+                torch.add(even, odd, out=responses[:, :count])
+                torch.sub(even[:, self._right], odd[:, self._right], out=responses[:, count:])
+                view = start + part * size
+                yield slice(view, view + len(even)), first, responses
+
+
+class NearestFilters(Rotations):
+    """Finds the filter with the least response to each rotation of a view."""
 
     def nearest(
         self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
@@ -104,47 +158,19 @@ class NearestFilters:
         Returns:
             The responses, and the indices of the filters; of responses that are equal but for rounding, any.
         """
-        n = len(views)
-        spectra = torch.fft.rfft(views)
-        rows = _parts(torch.cat([spectra, 1j * spectra]))  # Im(conj(V) F) is Re(conj(iV) F)
-        least = views.new_full((n, self._width), torch.inf)
-        index = torch.zeros(n, self._width, dtype=torch.int64, device=views.device)
-        for first, filters, biases in self._blocks(among):
-            products = torch.bmm(rows, filters).unflatten(1, (2, n))  # (f, 2, n, m)
-            products[0, 0] += self._width * biases  # frequency 0 adds to all rotations alike
-            for start in range(0, n, VIEWS):
-                some = slice(start, start + VIEWS)
-                self._update(products[:, :, some], first, least[some], index[some])
-        return least, index
-
-    def _update(self, products: torch.Tensor, first: int, least: torch.Tensor, index: torch.Tensor) -> None:
-        """Enter the least of these responses, and their filters, where they are less than what was found before."""
-        even, odd = (
-            (inverse @ part.flatten(1)).unflatten(1, part.shape[1:])
-            for inverse, part in zip((self._even, self._odd), products.unbind(1), strict=True)
-        )
-        for rotations, responses in ((self._left, even + odd), (self._right, even - odd)):
+        n, width = len(views), views.shape[2]
+        least = views.new_full((n, width), torch.inf)
+        index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
+        for some, first, responses in self.responses(views, among):
             values, which = _least(responses)
-            less = values < least[:, rotations]
-            least[:, rotations] = values.where(less, least[:, rotations])
-            index[:, rotations] = (first + which).where(less, index[:, rotations])
-
-    def _blocks(self, among: slice) -> Iterator[tuple[int, torch.Tensor, torch.Tensor]]:
-        """Index of the first filter, filters (f, 2 h, m) and biases (m,) of each block, as far as they are `among` those to compare."""
-        start, stop, _ = among.indices(sum(map(len, self._biases)))
-        for first, filters, biases in zip(range(0, stop, FILTERS), self._filters, self._biases, strict=False):
-            inside = slice(max(start - first, 0), stop - first)
-            if inside.start < len(biases):
-                yield first + inside.start, filters[:, :, inside], biases[inside]
+            less = values < least[some]
+            least[some] = values.where(less, least[some])
+            index[some] = (first + which).where(less, index[some])
+        return least[:, self.order], index[:, self.order]
 
 
-def _parts(spectra: torch.Tensor) -> Float32[torch.Tensor, "f n parts"]:
-    """Real parts of all rows, then imaginary parts of all rows, of spectra (n, h, f)."""
-    return torch.view_as_real(spectra).permute(2, 0, 3, 1).flatten(2)
-
-
-def _least(responses: Float32[torch.Tensor, "half n m"]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Least response over the filters (n, half), and its index. On a CPU by numpy, whose argmin is faster than torch's."""
+def _least(responses: Float32[torch.Tensor, "n w m"]) -> tuple[torch.Tensor, torch.Tensor]:
+    """Least response over the filters (n, w), and its index. On a CPU by numpy, whose argmin is faster than torch's."""
     on_cpu = responses.device.type == "cpu"
-    index = torch.from_numpy(responses.numpy().argmin(axis=-1)) if on_cpu else responses.argmin(dim=-1)
-    return responses.gather(-1, index[..., None])[..., 0].T, index.T
+    index = torch.from_numpy(responses.numpy().argmin(axis=2)) if on_cpu else responses.argmin(dim=2)
+    return responses.gather(2, index[..., None])[..., 0], index

@@ -19,6 +19,7 @@ from tussock.world.settings import choice, number, numbers, whole, wholes
 
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .checks import check_scan, check_training
+from .rotations import one_by_one
 
 ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
     "identity": lambda x: x,
@@ -169,8 +170,8 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
     def _scan(self, views: Images) -> Scans:
         """The first layer's weights are the engine's filters; the others see its units at each rotation."""
-        activity = self._responses(views)  # (n, w, units)
-        return forward(ACTIVATIONS[self.activation](activity), self._layers[1:], self.activation)
+        activity = ACTIVATIONS[self.activation](self._responses(views))  # (n, w, units)
+        return one_by_one(lambda units: forward(units, self._layers[1:], self.activation), activity)
 
     def _train(self, inputs: torch.Tensor, targets: torch.Tensor) -> Layers:
         """Fitted layers."""

@@ -13,7 +13,7 @@ from tussock.world.settings import number, whole
 
 from .base import Images, Learned, Model, Scans, Shapes, model
 from .filter_bank import FilterBank
-from .rotations import gaussian
+from .rotations import gaussian, one_by_one
 
 
 @model
@@ -99,7 +99,9 @@ class MLPRotation(Model):
         self._responses = self._bank(self.learned["weights"], self.learned["biases"]).responses
 
     def _outputs(self, views: Images) -> Float32[torch.Tensor, "n w networks"]:
-        return network_outputs(self._responses(views), self.learned["output"])
+        return one_by_one(
+            lambda responses: network_outputs(responses[None], self.learned["output"])[0], self._responses(views)
+        )
 
     def _scan(self, views: Images) -> Scans:
         return self._outputs(views)[..., 0]

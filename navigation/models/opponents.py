@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 import torch
 
 from ..feature_mask import FeatureMask, seeing
-from .base import FamiliarityModel, Images, IncrementalModel, Learned, Model, Scans, Shapes, memory_bytes
+from .base import FamiliarityModel, Images, Learned, Model, Scans, Shapes, memory_bytes
+from .incremental import IncrementalModel
 
 OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
 

@@ -1,18 +1,25 @@
 """Perfect memory: every view of the route is kept, and the most similar one is recognised."""
 
+import copy
+
 import numpy as np
 import torch
-from jaxtyping import Float32, Int64
+from jaxtyping import Float32, Float64, Int64
 
 from tussock.render.compile import compiled
 from tussock.world.errors import SettingError
 
 from ..feature_mask import energies, is_partial
 from ..overlap import BLOCK, overlaps
-from .base import Images, IncrementalModel, Learned, Scans, Shapes, model
+from .base import Images, Learned, Scans, Shapes, model
 from .checks import check_scan
-from .filter_bank import FILTERS, NearestFilters
+from .filter_bank import FilterBank, NearestFilters
+from .growing import Growing
+from .incremental import IncrementalModel
 from .rotations import in_batches
+from .spectra import FILTERS
+
+Banks = list[tuple[FilterBank, Float64[torch.Tensor, " m"]]]
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
 ROUNDING = 1e-6
@@ -38,7 +45,7 @@ class PerfectMemory(IncrementalModel):
     @property
     def snapshots(self) -> Float32[torch.Tensor, "m h w"]:
         """The views it keeps, as the eye saw them."""
-        return self.learned["snapshots"]
+        return self._learned["snapshots"]
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
@@ -57,20 +64,48 @@ class PerfectMemory(IncrementalModel):
     def _shapes(self, height: int, width: int) -> Shapes:
         return {"snapshots": (None, height, width)}
 
+    def _learn_more(self, shape: tuple[int, int], views: Images) -> None:
+        """Only what is new is transformed and stored; snapshots that others hold stay as they are."""
+        self._check_form(shape, self._learned)
+        grown, seen = copy.copy(self), self._seen(views)
+        grown._memory = self._memory.appended(seen)
+        grown._learned = {"snapshots": grown._memory.tensor}
+        grown._compare(seen)
+        vars(self).update(vars(grown))
+
     def _prepare(self) -> None:
-        if self.mask is not None and self.mask.partial:
+        self._memory = Growing(self.snapshots)
+        self._filters, self._banks = None, []
+        # The distance does not change when a constant is taken from all pixels; float32 keeps more digits of it around 0.
+        self._level = float(self.snapshots[0].mean(dtype=torch.float64))
+        self._energies = self.snapshots.new_empty(0)
+        self._compare(self.snapshots)
+
+    def _compare(self, snapshots: Images) -> None:
+        """Make the last snapshots ready to be compared, next to those before them."""
+        if is_partial(self.mask):
             self._overlaps = list(overlaps(self.snapshots, self.mask))
             return
         if self.mask is not None:
-            blocks = self.snapshots.split(FILTERS)
-            self._banks = [(self._bank(block), energies(block.double(), None)[:, 0]) for block in blocks]
+            self._banks = self._compared_seen(snapshots)
             return
-        # The distance does not change when a constant is taken from all pixels; float32 keeps more digits of it around 0.
-        self._level = float(self.snapshots.mean(dtype=torch.float64))
-        centred = self.snapshots - self._level
-        self._energies = energies(centred, None)[:, 0]
-        self._filters = NearestFilters(-2 * centred, self._energies)
+        centred = snapshots - self._level
+        new = energies(centred, None)[:, 0]
+        self._energies = torch.cat([self._energies, new])
+        self._filters = (
+            NearestFilters(-2 * centred, new) if self._filters is None else self._filters.appended(-2 * centred, new)
+        )
         self._on_cpu = self.snapshots.cpu().numpy()
+
+    def _compared_seen(self, snapshots: Images) -> Banks:
+        """The same behind a mask: snapshots in blocks of FILTERS, each with its |s|^2."""
+        banks, squares = list(self._banks), energies(snapshots.double(), None)[:, 0]
+        space = FILTERS - len(banks[-1][1]) if banks else 0
+        if space:
+            bank, before = banks.pop()
+            banks.append((bank.appended(snapshots[:space]), torch.cat([before, squares[:space]])))
+        blocks = zip(snapshots[space:].split(FILTERS), squares[space:].split(FILTERS), strict=True)
+        return [*banks, *((self._bank(block), some) for block, some in blocks if len(block))]
 
     def _scan(self, views: Images) -> Scans:
         return self._nearest(views)[0]
