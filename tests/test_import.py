@@ -385,3 +385,33 @@ def test_the_command_imports_a_sphere_as_jpeg(capfd, tmp_path):
     code, _, err = run(capfd, tmp_path / "raw", "--track", track, "--out", tmp_path / "e", "--format", "gif")
     assert code == 2
     assert re.search("format is 'gif'", err)
+
+
+def test_assumptions_are_repeated_only_where_images_are_written(capfd, folder, tmp_path):
+    track = table(tmp_path / "t.csv", "x,y", BEND[:, :2])
+    arguments = (folder, "--track", track, "--out", tmp_path / "d", "--lens", "panorama")
+    code, _, first = run(capfd, *arguments)
+    assert code == 0
+    assert "is taken as metres" in first
+    assert re.search(r"^written +0$", run(capfd, *arguments)[1], re.MULTILINE)
+    assert run(capfd, *arguments)[2] == ""
+    (tmp_path / "d" / "image_00004.png").unlink()
+    assert run(capfd, *arguments)[2] == first
+    code, _, err = run(capfd, *arguments, "--every", 2)
+    assert (code, len(err.splitlines())) == (2, len(first.splitlines()) + 1)
+
+
+def test_what_is_not_there_is_named_before_anything_else_is_wrong(capfd, folder, tmp_path):
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading", np.c_[BEND[:, :2], bearings()])
+    new = ("--track", track, "--out", tmp_path / "d")
+    for source in (tmp_path / "none", tmp_path / "none.mp4"):
+        code, _, err = run(capfd, source, *new)
+        assert (code, err) == (
+            2,
+            f"tussock: there is no folder or video {source}; give a folder of pictures, or a video\n",
+        )
+    code, _, err = run(capfd, track, *new)
+    assert re.fullmatch(r"tussock: .*t\.csv is neither a folder of pictures nor a video .*\n", err)
+    code, _, err = run(capfd, folder, "--track", track, "--out", folder)
+    assert (code, err) == (2, f"tussock: {folder} exists already and is not an image database; give a new folder\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["raw", "t.csv"]

@@ -19,13 +19,13 @@ from tussock.world.settings import MAX_COORDINATE, choice, number, settings, tex
 from ..eye import Eye
 from ..mask import MIN_BRIGHT, fitted, read_mask
 from .camera import Camera
-from .completing import complete, metadata_of, missing_rows, start_or_resume
+from .completing import check_folder, complete, metadata_of, missing_rows, start_or_resume
 from .database import KINDS, Database, check_video_name, read_database
 from .entries import ENTRIES, FILENAME, HEADING, Columns, X, Y, Z, bearings_in_file, format_decimal
 from .lens_metadata import needs_unwrapping, stated_unwrapping, unwrapper_in
 from .metadata import METADATA, group_in, read_metadata
 from .pictures import Picture, encoded
-from .sources import is_video_file, label, read_panoramas, sample
+from .sources import check_source, is_video_file, label, read_panoramas, sample
 from .taken import Taken, taken_from_folder, taken_from_video
 from .track import Track, read_track
 from .unwrapping import Unwrapping
@@ -91,6 +91,8 @@ def import_database(
         InputError: Anything cannot be read or does not fit together, or `out` holds anything else. Then nothing is changed.
     """
     camera, settings = camera or Camera(), settings or ImportSettings()
+    check_folder(out)
+    check_source(source)
     origin = _metadata_of(source)
     kind = settings.kind or str(origin.get("type", "route"))
     if kind not in KINDS:
@@ -105,8 +107,21 @@ def import_database(
     else:
         taken = taken_from_folder(source, rows, settings.every)
     pictures = sample(source, taken.references)
-    shape = pictures[0].shape
     unwrapping = _unwrapping(origin, metadata_path, camera, pictures)
+    return _imported(out, source, taken, pictures[0].shape, unwrapping, kind, settings, progress)
+
+
+def _imported(
+    out: Path,
+    source: Path,
+    taken: Taken,
+    shape: tuple[int, ...],
+    unwrapping: Unwrapping,
+    kind: str,
+    settings: ImportSettings,
+    progress: Progress,
+) -> tuple[Database, int]:
+    """Write the database of pictures of a shape, and return what `import_database` does."""
     seen = _seen(unwrapping, settings.mask, shape)
     height = float(np.median(taken.z)) if settings.height is None else settings.height
     eye = Eye(width=unwrapping.width, height=unwrapping.height, top=unwrapping.top, bottom=unwrapping.bottom, z=height)

@@ -17,15 +17,18 @@ SAMPLE_FRAMES = 300  # of a video, from which they are taken
 Reference = str | int  # name of a picture, or number of a frame
 
 
+def check_source(path: Path) -> None:
+    """Refuse what is neither a folder nor a video. Raises FileError."""
+    if os.path.isfile(path) and not is_video_file(path):
+        check_content(path)
+        raise FileError(f"{path} is neither a folder of pictures nor a video (AVI, MP4, MOV or MKV); give one of these")
+    if not os.path.exists(path):
+        raise FileError(f"there is no folder or video {path}; give a folder of pictures, or a video")
+
+
 def picture_names(folder: Path) -> list[str]:
     """Names of the pictures in a folder, by the numbers in them: image2 comes before image10. Raises FileError if there are none."""
-    if folder.is_file():
-        check_content(folder)
-        raise FileError(
-            f"{folder} is neither a folder of pictures nor a video (AVI, MP4, MOV or MKV); give one of these"
-        )
-    if not folder.is_dir():
-        raise FileError(f"there is no folder {folder}; give pictures, a folder of pictures, or a video")
+    check_source(folder)
     names = [
         path.name for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
     ]

@@ -42,9 +42,8 @@ class VideoReader:
         """Prepare to read a video, which is opened at the first frame."""
         self.path = path
         self._lock = Lock()
-        self._state: tuple[cv2.VideoCapture, int, tuple[int, ...]] | None = (
-            None  # with its next frame, and the file's stamp
-        )
+        # The open video, the number of its next frame, and the stamp of the file.
+        self._state: tuple[cv2.VideoCapture, int, tuple[int, ...]] | None = None
         _readers.add(self)
 
     @property
@@ -60,7 +59,8 @@ class VideoReader:
             state, self._state = self._state, None
             if state is None or number < state[1] - 1 or state[2] != _stamp(self.path):
                 state = None  # closed before the next one is opened
-                state = _open(self.path), 0, _stamp(self.path)
+                stamp = _stamp(self.path)
+                state = _open(self.path), 0, stamp
             capture, position, stamp = state
             while position <= number:
                 if not capture.grab():
