@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from commands import interrupted
 
 from tussock.navigation.cli.main import main
 from tussock.render.images.camera import Camera
@@ -399,6 +400,30 @@ def test_assumptions_are_repeated_only_where_images_are_written(capfd, folder, t
     assert run(capfd, *arguments)[2] == first
     code, _, err = run(capfd, *arguments, "--every", 2)
     assert (code, len(err.splitlines())) == (2, len(first.splitlines()) + 1)
+
+
+def test_ctrl_c_leaves_a_database_that_a_second_run_completes(capfd, tmp_path):
+    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (720, 152))
+    for i in range(100):
+        writer.write(picture(i % 20, 720, 152)[..., ::-1])
+    writer.release()
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", [(i / 100, 0, 0) for i in range(100)])
+    out = tmp_path / "d"
+    arguments = [tmp_path / "v.avi", "--track", track, "--lens", "panorama", "--out"]
+    code, err = interrupted(lambda: any(out.glob("image_*")), "database", "import", *arguments, out)
+    assert (code, err.splitlines()[-1]) == (130, "tussock: interrupted")
+    assert not list(out.glob(".*"))
+    for path in out.glob("image_*"):
+        read_image(path)
+    if (out / ENTRIES).exists():
+        assert len(read_database(out).views()) < 100
+    assert run(capfd, *arguments, out)[0] == 0
+    assert run(capfd, *arguments, tmp_path / "at once")[0] == 0
+    both = [
+        {path.name: path.read_bytes() for path in folder.iterdir() if path.name != METADATA}
+        for folder in (out, tmp_path / "at once")
+    ]
+    assert both[0] == both[1]
 
 
 def test_what_is_not_there_is_named_before_anything_else_is_wrong(capfd, folder, tmp_path):

@@ -68,13 +68,16 @@ def is_frames(references: Sequence[Reference]) -> bool:
     return isinstance(references[0], int)
 
 
-def sample(source: Path, references: Sequence[Reference]) -> list[Picture]:
-    """Some of the pictures, as different as it is cheap to read. Raises FileError where they differ in size."""
+def sampled(references: Sequence[Reference]) -> list[Reference]:
+    """Some of the pictures, as different as it is cheap to read."""
     if is_frames(references):
-        early = [each for each in sorted(set(references)) if int(each) < int(min(references)) + SAMPLE_FRAMES]
-        chosen: Sequence[Reference] = early[:: max(1, len(early) // SAMPLE)]
-    else:
-        chosen = references[:: max(1, len(references) // SAMPLE)]
+        references = [each for each in sorted(set(references)) if int(each) < int(min(references)) + SAMPLE_FRAMES]
+    return list(references[:: max(1, len(references) // SAMPLE)])
+
+
+def sample(source: Path, references: Sequence[Reference]) -> list[Picture]:
+    """The pictures that `sampled` chooses. Raises FileError where they differ in size."""
+    chosen = sampled(references)
     pictures = list(read_pictures(source, chosen))
     for reference, picture in zip(chosen, pictures, strict=True):
         check_alike(source, reference, picture, pictures[0].shape)
