@@ -440,3 +440,22 @@ def test_what_is_not_there_is_named_before_anything_else_is_wrong(capfd, folder,
     code, _, err = run(capfd, folder, "--track", track, "--out", folder)
     assert (code, err) == (2, f"tussock: {folder} exists already and is not an image database; give a new folder\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["raw", "t.csv"]
+
+
+def test_flags_that_would_do_nothing_are_refused(capfd, folder, video, tmp_path):
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
+    framed = table(tmp_path / "f.csv", "frame,x_m,y_m,heading_rad", [(i, *BEND[i]) for i in range(N)])
+    new = ("--out", tmp_path / "d", "--lens", "panorama")
+    for arguments, words in (
+        ((folder, "--track", track, *new, "--start-s", 3), "is a folder; leave it out"),
+        ((video, "--track", track, *new, "--start-s", 3), "has no times"),
+        ((video, "--track", framed, *new, "--start-s", 3), "has no times"),
+        ((folder, "--track", track, *new, "--inner-px", 3), "inner of a ring, and the lens is 'panorama'"),
+        ((folder, "--track", track, *new, "--top-deg", -20), "bottom is -15 and top is -20 degrees"),
+        ((video, *new), "no table of where the pictures of .* were taken; give one with --track"),
+    ):
+        code, _, err = run(capfd, *arguments)
+        assert (code, (tmp_path / "d").exists()) == (2, False), arguments
+        assert re.search(words, err.splitlines()[-1]), err
+    code, _, err = run(capfd, folder, "--track", track, "--out", tmp_path / "d", "--inner-px", 3)
+    assert (code, err.splitlines()[-1].count("no ring was found")) == (2, 1)

@@ -374,6 +374,8 @@ def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     save(tmp_path / "p.png", wrapped(panorama(), RING))
     save(tmp_path / "grey.png", np.full((50, 50, 3), 90, np.uint8))
+    (tmp_path / "pictures").mkdir()
+    save(tmp_path / "pictures" / "p.png", panorama())
     (tmp_path / "v.mp4").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     for arguments, message in (
         (["v.mp4", "--out", "o"], "git lfs pull"),
@@ -385,11 +387,16 @@ def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkey
         (["p.png", "--out", "o.png", "--top-deg", "-20", "--lens", "ring"], "bottom < top"),
         (["grey.png", "--out", "o.png", "--lens", "ring"], "no ring was found"),
         (["none.png", "--out", "o.png"], "there is no"),
+        (["p.png", "--out", "p.png"], "is the picture itself"),
+        (["p.png", "--out", "o.png", "--lens", "fisheye", "--calibration", "c.yaml"], r"c\.yaml cannot be read: there is no such file"),
+        (["p.png", "--out", "o.png", "--lens", "panorama", "--centre", "1,2"], "of a ring"),
+        (["grey.png", "--out", "o", "--every", "0"], "give at least 1"),
+        (["pictures", "--out", "pictures", "--lens", "panorama"], "is the folder of the pictures"),
     ):
         code, out, err = run(capfd, *arguments)
         assert (code, out) == (2, ""), arguments
         assert re.search(message, err.splitlines()[-1]), err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.png", "p.png", "v.mp4"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.png", "p.png", "pictures", "v.mp4"]
 
 
 def test_invalid_rings_are_refused():

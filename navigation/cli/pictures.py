@@ -100,7 +100,7 @@ class UnwrapCommand(CameraOptions):
                 self.source,
                 self.out,
                 self.camera(),
-                self.every or 1,
+                1 if self.every is None else self.every,
                 f".{self.format}",
                 self.quality,
                 self.picture,

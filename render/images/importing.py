@@ -97,6 +97,8 @@ def import_database(
     kind = settings.kind or str(origin.get("type", "route"))
     if kind not in KINDS:
         raise FileError(f"{source / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
+    if track is None and not origin:
+        raise FileError(f"there is no table of where the pictures of {source} were taken; give one with --track")
     rows = _rows(track or source / ENTRIES, kind, settings)
     metadata_path = source / METADATA
     if origin.get("videoFile"):
@@ -104,6 +106,8 @@ def import_database(
         source = source / str(origin["videoFile"])
     if is_video_file(source):
         taken = taken_from_video(source, rows, settings.every, settings.start)
+    elif settings.start is not None:
+        raise SettingError(f"a start is the time at which a video begins, and {source} is a folder; leave it out")
     else:
         taken = taken_from_folder(source, rows, settings.every)
     pictures = sample(source, taken.references)
@@ -163,7 +167,7 @@ def _unwrapping(origin: dict[str, Any], path: Path, camera: Camera, pictures: li
         pictures: Some of the pictures.
     """
     height, width = pictures[0].shape[:2]
-    given = camera.lens != "auto" or camera.centre is not None
+    given = camera.lens != "auto" or any(each is not None for each in (camera.centre, camera.inner, camera.outer))
     if not given and unwrapper_in(origin) and needs_unwrapping(origin, height, width):
         return stated_unwrapping(origin, height, width, path)
     eye = group_in(origin, "tussock", "eye")

@@ -50,7 +50,7 @@ def unwrap_files(
     """
     single = os.path.isfile(source) and not is_video_file(source)
     folder, references = _chosen(source, every, single)
-    files = _files(out, references, single, suffix)
+    files = _files(out, source, references, single, suffix)
     if drawing is not None:
         check_writable(drawing)
     pictures = sample(folder, references)
@@ -78,10 +78,12 @@ def _chosen(source: Path, every: int, single: bool) -> tuple[Path, list[Referenc
     return source, list(frames_of(source, every) if is_video_file(source) else picture_names(source)[::every])
 
 
-def _files(out: Path, references: list[Reference], single: bool, suffix: str) -> dict[Reference, Path]:
+def _files(out: Path, source: Path, references: list[Reference], single: bool, suffix: str) -> dict[Reference, Path]:
     """The file to write for each picture. Raises FileError where all are there already, or anything else is."""
     if single:
         check_writable(out)
+        if out.resolve() == source.resolve():
+            raise FileError(f"{out} is the picture itself; give another file to write")
         if out.suffix.lower() not in FORMATS:
             raise FileError(f"{out}: a panorama is written as .png or .jpg")
         return {references[0]: out}
@@ -93,6 +95,8 @@ def _files(out: Path, references: list[Reference], single: bool, suffix: str) ->
     found = set(out.iterdir()) - partial if out.is_dir() else set()
     if not out.is_dir() or not found <= set(files.values()):
         check_new(out)
+    if out.resolve() == source.resolve():
+        raise FileError(f"{out} is the folder of the pictures; give a new folder")
     if len(found) == len(files):
         raise FileError(f"{out} holds all {len(files)} panoramas already; give a new folder")
     for path in partial:
