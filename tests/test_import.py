@@ -252,12 +252,28 @@ def test_a_mask_is_unwrapped_and_kept_with_the_eye(tmp_path, raw):
         import_database(tmp_path / "e", tmp_path / "raw", track, camera, ImportSettings(mask=tmp_path / "m.png"))
 
 
-def test_a_transparent_part_of_a_mask_is_covered(folder, tmp_path):
+def test_a_picture_that_cannot_be_read_leaves_nothing(folder, tmp_path):
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
+    whole = (folder / "p7.png").read_bytes()
+    (folder / "p7.png").write_bytes(b"text")
+    covered = np.full((HEIGHT, WIDTH, 3), 255, np.uint8)
+    covered[:, :5] = 0
+    mask = save(tmp_path / "m.png", covered)
+    for _ in range(2):
+        with pytest.raises(FileError, match=r"p7\.png cannot be read"):
+            import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(mask=mask))
+        assert not (tmp_path / "d").exists()
+    (folder / "p7.png").write_bytes(whole)
+    assert import_database(tmp_path / "d", folder, track, CAMERA)[1] == N
+
+
+def test_a_transparent_part_of_a_mask_is_covered(folder, tmp_path, caplog):
     mask = np.full((HEIGHT, WIDTH, 4), 255, np.uint8)
     mask[:, :5, 3] = 0  # white, and transparent
     cv2.imwrite(str(tmp_path / "m.png"), mask)
     track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
     import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(mask=tmp_path / "m.png"))
+    assert "m.png covers 16 % of the panorama: kept as mask.png of the eye" in caplog.text
     kept = read_image(tmp_path / "d" / "mask.png")
     assert (kept[:, :5] == 0).all()
     assert (kept[:, 6:-1] == 255).all()

@@ -388,7 +388,10 @@ def test_bad_flags_are_one_line_exit_2_and_leave_nothing(capfd, tmp_path, monkey
         (["grey.png", "--out", "o.png", "--lens", "ring"], "no ring was found"),
         (["none.png", "--out", "o.png"], "there is no"),
         (["p.png", "--out", "p.png"], "is the picture itself"),
-        (["p.png", "--out", "o.png", "--lens", "fisheye", "--calibration", "c.yaml"], r"c\.yaml cannot be read: there is no such file"),
+        (
+            ["p.png", "--out", "o.png", "--lens", "fisheye", "--calibration", "c.yaml"],
+            r"c\.yaml cannot be read: there is no such file",
+        ),
         (["p.png", "--out", "o.png", "--lens", "panorama", "--centre", "1,2"], "of a ring"),
         (["grey.png", "--out", "o", "--every", "0"], "give at least 1"),
         (["pictures", "--out", "pictures", "--lens", "panorama"], "is the folder of the pictures"),

@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,14 @@ def start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
         check_folder(folder)
         make_folder(folder)
         write_metadata(folder / METADATA, metadata)
+
+
+def discard(folder: Path, names: list[str]) -> None:
+    """Delete files of a database of which no row is listed yet, and the folder if nothing else is in it."""
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def missing_rows(folder: Path, columns: Columns) -> list[int]:

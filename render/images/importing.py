@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from tussock.world.atomic import replacing
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, choice, number, settings, text, whole
@@ -19,7 +19,7 @@ from tussock.world.settings import MAX_COORDINATE, choice, number, settings, tex
 from ..eye import Eye
 from ..mask import MIN_BRIGHT, fitted, read_mask
 from .camera import Camera
-from .completing import check_folder, complete, metadata_of, missing_rows, start_or_resume
+from .completing import check_folder, complete, discard, metadata_of, missing_rows, start_or_resume
 from .database import KINDS, Database, check_video_name, read_database
 from .entries import ENTRIES, FILENAME, HEADING, Columns, X, Y, Z, bearings_in_file, format_decimal
 from .lens_metadata import needs_unwrapping, stated_unwrapping, unwrapper_in
@@ -88,7 +88,8 @@ def import_database(
         The database, and how many images were written by this call.
 
     Raises:
-        InputError: Anything cannot be read or does not fit together, or `out` holds anything else. Then nothing is changed.
+        InputError: Anything cannot be read or does not fit together, or `out` holds anything else. Then nothing is changed, unless images
+            before one that cannot be read are listed already.
     """
     camera, settings = camera or Camera(), settings or ImportSettings()
     check_folder(out)
@@ -140,7 +141,12 @@ def _imported(
     missing = missing_rows(out, columns)
     missing.sort(key=lambda row: taken.references[row] if isinstance(taken.references[row], int) else row)
     panoramas = read_panoramas(source, [taken.references[row] for row in missing], unwrapping, shape)
-    complete(out, columns, missing, lambda rows: [next(panoramas) for _ in rows], progress, settings.quality)
+    try:
+        complete(out, columns, missing, lambda rows: [next(panoramas) for _ in rows], progress, settings.quality)
+    except InputError:  # with the picture that cannot be read replaced, it is another source, and refused as such
+        if not (out / ENTRIES).exists():
+            discard(out, [METADATA, MASK, *columns[FILENAME]])
+        raise
     return read_database(out), len(missing)
 
 
@@ -193,7 +199,14 @@ def _seen(unwrapping: Unwrapping, mask: Path | None, shape: tuple[int, ...]) -> 
                 f"{mask} is {drawn.shape[1]} x {drawn.shape[0]}; give a mask of the size of the pictures ({shape[1]} x {shape[0]}) "
                 f"or of the panoramas ({seen.shape[1]} x {seen.shape[0]})"
             )
-        seen &= fitted(drawn, unwrapping.width, unwrapping.height)
+        drawn = fitted(drawn, unwrapping.width, unwrapping.height)
+        log.warning(
+            "%s covers %.0f %% of the panorama: kept as %s of the eye; what is behind is not known",
+            mask,
+            100 * (1 - drawn.mean()),
+            MASK,
+        )
+        seen &= drawn
     if not seen.any():
         raise SettingError(
             "the mask covers the whole panorama; a mask is white where the eye sees, and black where it is covered"
