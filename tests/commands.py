@@ -1,8 +1,11 @@
 """The command line in tests: commands in this process or in one of their own, and the keys of what they print with --json."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +74,19 @@ def printed(capfd, *arguments: Any, code: int = 0) -> dict[str, Any]:
 def process(*arguments: Any, **options: Any) -> subprocess.CompletedProcess:
     """A command in a process of its own."""
     return subprocess.run([TUSSOCK, *map(str, arguments)], capture_output=True, text=True, **options)
+
+
+def interrupted(ready: Callable[[], bool], *arguments: Any) -> tuple[int, str]:
+    """Exit code and standard error of a command in a process of its own that gets Ctrl-C when something is ready."""
+    running = subprocess.Popen(
+        [TUSSOCK, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    while not ready():
+        assert running.poll() is None, running.communicate()
+        time.sleep(0.002)
+    running.send_signal(signal.SIGINT)
+    err = running.communicate()[1]
+    return running.returncode, err
 
 
 def process_json(*arguments: Any, **options: Any) -> dict[str, Any]:

@@ -116,6 +116,35 @@ def test_images_that_no_row_names(route):
     assert only(route, "unlisted-image").where == "extra.PNG"
 
 
+def test_a_mask_that_is_not_there(route):
+    metadata = read_metadata(route / METADATA)
+    metadata["tussock"]["eye"]["mask"] = "mask.png"
+    write_metadata(route / METADATA, metadata)
+    assert only(route, "missing-mask").where == METADATA
+    cv2.imwrite(str(route / "mask.png"), np.full((6, 24), 255, dtype=np.uint8))
+    assert check_database(route) == []
+
+
+def test_rows_without_headings_are_remarked_upon(route, caplog):
+    lines = (route / ENTRIES).read_text().splitlines()
+    at = lines[0].split(", ").index("Heading [degrees]")
+    for row in (3, 4):
+        cells = lines[row].split(", ")
+        cells[at] = ""
+        lines[row] = ", ".join(cells)
+    (route / ENTRIES).write_text("\n".join(lines) + "\n")
+    assert check_database(route) == []
+    assert [f"line 4: 2 of {len(lines) - 1} rows have no heading" in each.getMessage() for each in caplog.records] == [
+        True
+    ]
+
+
+def test_a_database_of_which_no_row_is_written_yet(route):
+    (route / ENTRIES).unlink()
+    with pytest.raises(InputError, match="if it was interrupted, the same command completes it"):
+        check_database(route)
+
+
 def test_repeated_rows(route):
     lines = (route / ENTRIES).read_text().splitlines(keepends=True)
     (route / ENTRIES).write_text("".join([*lines[:9], lines[8], *lines[9:]]))

@@ -20,7 +20,7 @@ from tussock.navigation.training import AHEAD, training_poses_in, training_views
 from tussock.navigation.walk import Walk
 from tussock.render.eye import Eye
 from tussock.render.images import Grid, read_database, write_database
-from tussock.render.images.folders import eye_of, reach_of
+from tussock.render.images.folders import eye_of, reach_of, route_of
 from tussock.render.images.metadata import METADATA, read_metadata, write_metadata
 from tussock.render.images.source import open_views
 from tussock.render.renderer import Renderer, open_renderer
@@ -345,6 +345,20 @@ def test_databases_that_cannot_be_used_are_refused_in_a_line(drawn, copies, tmp_
     (route / "database_entries.csv").write_text("\n".join(lines) + "\n")
     with pytest.raises(FileError, match="line 4: the position or heading is missing"):
         Experiment(route_database=route, grid_database=grid)
+
+
+def test_a_route_without_headings_is_used_with_those_of_its_path(copies):
+    route = copies[0]
+    entries = route / "database_entries.csv"
+    entries.write_text(entries.read_text().replace("Heading [degrees]", "Something"))
+    with pytest.raises(FileError, match="--headings path takes the direction"):
+        route_of(route)
+    with open_views(route, headings="path") as views:
+        assert np.allclose(views.poses, route_of(route, "path").poses)
+    lines = entries.read_text().splitlines()
+    entries.write_text("\n".join([lines[0], lines[1], lines[1].replace("image_00000", "image_00001")]) + "\n")
+    with pytest.raises(FileError, match="views of one position"):
+        route_of(route, "path")
 
 
 def test_the_eye_of_a_database_is_that_of_its_metadata_or_its_images(copies, caplog):

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from commands import interrupted
 
 from tussock.navigation.cli.main import main
 from tussock.render.images.camera import Camera
@@ -263,12 +264,28 @@ def test_a_mask_is_unwrapped_and_kept_with_the_eye(tmp_path, raw):
         import_database(tmp_path / "e", tmp_path / "raw", track, camera, ImportSettings(mask=tmp_path / "m.png"))
 
 
-def test_a_transparent_part_of_a_mask_is_covered(folder, tmp_path):
+def test_a_picture_that_cannot_be_read_leaves_nothing(folder, tmp_path):
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
+    whole = (folder / "p7.png").read_bytes()
+    (folder / "p7.png").write_bytes(b"text")
+    covered = np.full((HEIGHT, WIDTH, 3), 255, np.uint8)
+    covered[:, :5] = 0
+    mask = save(tmp_path / "m.png", covered)
+    for _ in range(2):
+        with pytest.raises(FileError, match=r"p7\.png cannot be read"):
+            import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(mask=mask))
+        assert not (tmp_path / "d").exists()
+    (folder / "p7.png").write_bytes(whole)
+    assert import_database(tmp_path / "d", folder, track, CAMERA)[1] == N
+
+
+def test_a_transparent_part_of_a_mask_is_covered(folder, tmp_path, caplog):
     mask = np.full((HEIGHT, WIDTH, 4), 255, np.uint8)
     mask[:, :5, 3] = 0  # white, and transparent
     cv2.imwrite(str(tmp_path / "m.png"), mask)
     track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
     import_database(tmp_path / "d", folder, track, CAMERA, ImportSettings(mask=tmp_path / "m.png"))
+    assert "m.png covers 16 % of the panorama: kept as mask.png of the eye" in caplog.text
     kept = read_image(tmp_path / "d" / "mask.png")
     assert (kept[:, :5] == 0).all()
     assert (kept[:, 6:-1] == 255).all()
@@ -397,3 +414,76 @@ def test_the_command_imports_a_sphere_as_jpeg(capfd, tmp_path):
     code, _, err = run(capfd, tmp_path / "raw", "--track", track, "--out", tmp_path / "e", "--format", "gif")
     assert code == 2
     assert re.search("format is 'gif'", err)
+
+
+def test_assumptions_are_repeated_only_where_images_are_written(capfd, folder, tmp_path):
+    track = table(tmp_path / "t.csv", "x,y", BEND[:, :2])
+    arguments = (folder, "--track", track, "--out", tmp_path / "d", "--lens", "panorama")
+    code, _, first = run(capfd, *arguments)
+    assert code == 0
+    assert "is taken as metres" in first
+    assert re.search(r"^written +0$", run(capfd, *arguments)[1], re.MULTILINE)
+    assert run(capfd, *arguments)[2] == ""
+    (tmp_path / "d" / "image_00004.png").unlink()
+    assert run(capfd, *arguments)[2] == first
+    code, _, err = run(capfd, *arguments, "--every", 2)
+    assert (code, len(err.splitlines())) == (2, len(first.splitlines()) + 1)
+
+
+def test_ctrl_c_leaves_a_database_that_a_second_run_completes(capfd, tmp_path):
+    writer = cv2.VideoWriter(str(tmp_path / "v.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10, (720, 152))
+    for i in range(100):
+        writer.write(picture(i % 20, 720, 152)[..., ::-1])
+    writer.release()
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", [(i / 100, 0, 0) for i in range(100)])
+    out = tmp_path / "d"
+    arguments = [tmp_path / "v.avi", "--track", track, "--lens", "panorama", "--out"]
+    code, err = interrupted(lambda: any(out.glob("image_*")), "database", "import", *arguments, out)
+    assert (code, err.splitlines()[-1]) == (130, "tussock: interrupted")
+    assert not list(out.glob(".*"))
+    for path in out.glob("image_*"):
+        read_image(path)
+    if (out / ENTRIES).exists():
+        assert len(read_database(out).views()) < 100
+    assert run(capfd, *arguments, out)[0] == 0
+    assert run(capfd, *arguments, tmp_path / "at once")[0] == 0
+    both = [
+        {path.name: path.read_bytes() for path in folder.iterdir() if path.name != METADATA}
+        for folder in (out, tmp_path / "at once")
+    ]
+    assert both[0] == both[1]
+
+
+def test_what_is_not_there_is_named_before_anything_else_is_wrong(capfd, folder, tmp_path):
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading", np.c_[BEND[:, :2], bearings()])
+    new = ("--track", track, "--out", tmp_path / "d")
+    for source in (tmp_path / "none", tmp_path / "none.mp4"):
+        code, _, err = run(capfd, source, *new)
+        assert (code, err) == (
+            2,
+            f"tussock: there is no folder or video {source}; give a folder of pictures, or a video\n",
+        )
+    code, _, err = run(capfd, track, *new)
+    assert re.fullmatch(r"tussock: .*t\.csv is neither a folder of pictures nor a video .*\n", err)
+    code, _, err = run(capfd, folder, "--track", track, "--out", folder)
+    assert (code, err) == (2, f"tussock: {folder} exists already and is not an image database; give a new folder\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["raw", "t.csv"]
+
+
+def test_flags_that_would_do_nothing_are_refused(capfd, folder, video, tmp_path):
+    track = table(tmp_path / "t.csv", "x_m,y_m,heading_rad", BEND)
+    framed = table(tmp_path / "f.csv", "frame,x_m,y_m,heading_rad", [(i, *BEND[i]) for i in range(N)])
+    new = ("--out", tmp_path / "d", "--lens", "panorama")
+    for arguments, words in (
+        ((folder, "--track", track, *new, "--start-s", 3), "is a folder; leave it out"),
+        ((video, "--track", track, *new, "--start-s", 3), "has no times"),
+        ((video, "--track", framed, *new, "--start-s", 3), "has no times"),
+        ((folder, "--track", track, *new, "--inner-px", 3), "inner of a ring, and the lens is 'panorama'"),
+        ((folder, "--track", track, *new, "--top-deg", -20), "bottom is -15 and top is -20 degrees"),
+        ((video, *new), "no table of where the pictures of .* were taken; give one with --track"),
+    ):
+        code, _, err = run(capfd, *arguments)
+        assert (code, (tmp_path / "d").exists()) == (2, False), arguments
+        assert re.search(words, err.splitlines()[-1]), err
+    code, _, err = run(capfd, folder, "--track", track, "--out", tmp_path / "d", "--inner-px", 3)
+    assert (code, err.splitlines()[-1].count("no ring was found")) == (2, 1)

@@ -11,7 +11,7 @@ from tussock.world.errors import SettingError
 
 from ..experiment_settings import width_and_height
 from .options import Command
-from .terminal import progress
+from .terminal import held_messages, progress
 from .worlds import numbers
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class UnwrapCommand(CameraOptions):
                 self.source,
                 self.out,
                 self.camera(),
-                self.every or 1,
+                1 if self.every is None else self.every,
                 f".{self.format}",
                 self.quality,
                 self.picture,
@@ -153,8 +153,14 @@ class DatabaseImportCommand(CameraOptions):
             format=self.format,
             quality=self.quality,
         )
-        with progress("importing", "images") as report:
-            database, written = import_database(self.out, self.source, self.track, self.camera(), settings, report)
+        with progress("importing", "images") as report, held_messages() as let_go:
+
+            def reached(done: int, total: int) -> None:
+                let_go(True)
+                report(done, total)
+
+            database, written = import_database(self.out, self.source, self.track, self.camera(), settings, reached)
+            let_go(written > 0)  # what is assumed was printed when the images were written
         eye = database.metadata["tussock"]["eye"]
         return {
             "database": str(self.out),

@@ -5,6 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from logging.handlers import MemoryHandler
 from threading import Timer
 from typing import Any
 
@@ -35,6 +36,26 @@ def library_messages() -> Iterator[None]:
     finally:
         logger.removeHandler(handler)
         logger.setLevel(level)
+
+
+@contextmanager
+def held_messages() -> Iterator[Callable[[bool], None]]:
+    """Hold what the library logs until the given function is called: with True it is printed, with False it is not. An error prints it."""
+    logger = logging.getLogger("tussock")
+    handlers, held = list(logger.handlers), MemoryHandler(capacity=10_000, flushLevel=logging.CRITICAL + 1)
+    logger.handlers[:] = [held]
+
+    def let_go(printed: bool) -> None:
+        logger.handlers[:] = handlers
+        records, held.buffer = held.buffer, []
+        for record in records if printed else ():
+            for handler in handlers:
+                handler.handle(record)
+
+    try:
+        yield let_go
+    finally:
+        let_go(True)
 
 
 @contextmanager

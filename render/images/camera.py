@@ -28,7 +28,8 @@ class Camera:
     """How panoramas are made of pictures. What is None is found out, stated by a calibration, or taken as usual.
 
     Attributes:
-        lens: What the pictures are. auto: panoramas where they are at least twice as wide as high, rings otherwise.
+        lens: What the pictures are. auto: a ring where its centre or a radius is given; else panoramas where they are at least twice as
+            wide as high, rings otherwise.
         calibration: File of OpenCV's with K and D of a fisheye lens, or xi, K and D of an omnidirectional one.
         looking: What the middle of the picture of a calibrated lens shows.
         centre: x and y of a ring (pixels).
@@ -78,6 +79,12 @@ class Camera:
                 f"a calibration is of a fisheye or omnidirectional lens, not of {self.lens!r}; give that lens",
             )
 
+        ring = [name for name in ("centre", "inner", "outer", "flip") if getattr(self, name) not in (None, False)]
+        if ring and self.lens not in ("auto", "ring"):
+            raise FieldError(
+                "Camera", "", f"{', '.join(ring)} of a ring, and the lens is {self.lens!r}; leave out one of them"
+            )
+
     def unwrapping(self, pictures: Sequence[Picture]) -> Unwrapping:
         """How the pictures of this camera become panoramas. What is assumed is logged.
 
@@ -89,6 +96,8 @@ class Camera:
         """
         height, width = pictures[0].shape[:2]
         lens = self.lens
+        if lens == "auto" and not (self.centre is None and self.inner is None and self.outer is None):
+            lens = "ring"
         if lens == "auto" and self.field is not None:
             lens = "panorama"
         if lens == "auto":

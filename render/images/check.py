@@ -17,6 +17,7 @@ from tussock.world.headings import CONVENTIONS, diagnose
 from .database import assembled, check_kind, guessed_metadata, is_outside, stated_metadata
 from .entries import ENTRIES, FRAME, read_entries
 from .flow import grid_axes_error
+from .folders import MASK_SUFFIX
 from .inspection import Inspection, Problem, inspected
 from .lens_metadata import stated_unwrapping
 from .metadata import METADATA, group_in
@@ -43,7 +44,11 @@ def check_database(folder: str | os.PathLike, headings: str = "auto") -> list[Pr
     """
     folder = Path(folder)
     if not (folder / ENTRIES).is_file():
-        raise FileError(f"there is no {folder / ENTRIES}; give the folder of an image database")
+        begun = (folder / METADATA).is_file()
+        hint = (
+            "if it was interrupted, the same command completes it" if begun else "give the folder of an image database"
+        )
+        raise FileError(f"there is no {folder / ENTRIES}; {hint}")
     problems: list[Problem] = []
     metadata: dict[str, Any] | None = {}
     try:
@@ -85,6 +90,8 @@ def check_files(inspection: Inspection) -> Iterator[Problem]:
             yield Problem("unreadable-image", name, _why_unreadable(folder / name))
         lines.setdefault(name, inspection.database.lines[row])
     mask = group_in(inspection.database.metadata, "tussock", "eye").get("mask")
+    if isinstance(mask, str) and mask.endswith(MASK_SUFFIX) and not os.path.isfile(folder / mask):
+        yield Problem("missing-mask", METADATA, f"there is no {mask}, which is the mask of its eye")
     for path in sorted(folder.iterdir()):
         if (
             path.suffix.lower() in SUFFIXES
@@ -154,6 +161,12 @@ def check_headings(inspection: Inspection) -> Iterator[Problem]:
     if inspection.database.kind != "route" or inspection.headings == "as-is":
         return
     poses = inspection.database.poses
+    without = np.flatnonzero(np.isfinite(poses[:, :2]).all(axis=1) & np.isnan(poses[:, 2]))
+    if len(without):
+        where = f"{inspection.database.folder}, {inspection.line(int(without[0]))}"
+        logger.warning(
+            "%s: %d of %d rows have no heading; --headings path takes the path's", where, len(without), len(poses)
+        )
     diagnosis = diagnose(poses, inspection.headings if inspection.headings in CONVENTIONS else "bearing")
     if diagnosis.kind == "convention":
         yield Problem("heading-convention", ENTRIES, f"{diagnosis}; {diagnosis.flags}")

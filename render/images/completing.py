@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,14 @@ def metadata_of(
     return metadata | {"camera": described, "needsUnwrapping": 0, "isGreyscale": 0, "tussock": {"version": 1} | tussock}
 
 
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that holds anything else than an image database. Raises FileError."""
+    if (folder / METADATA).is_file():
+        return
+    if folder.exists() and (not folder.is_dir() or set(folder.iterdir()) - set(_partial_files(folder))):
+        raise FileError(f"{folder} exists already and is not an image database; give a new folder")
+
+
 def start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
     """Start a database in a new or empty folder, or resume the same one.
 
@@ -57,11 +66,18 @@ def start_or_resume(folder: Path, metadata: dict[str, Any]) -> None:
             group = theirs if name == "type" else group_in(theirs, "tussock")
             if group.get(name) != value:
                 raise FileError(f"{folder} holds an image database that differs in its {name}; give another folder")
-    elif folder.exists() and (not folder.is_dir() or set(folder.iterdir()) - set(_partial_files(folder))):
-        raise FileError(f"{folder} exists already and is not an image database; give a new folder")
     else:
+        check_folder(folder)
         make_folder(folder)
         write_metadata(folder / METADATA, metadata)
+
+
+def discard(folder: Path, names: list[str]) -> None:
+    """Delete files of a database of which no row is listed yet, and the folder if nothing else is in it."""
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def missing_rows(folder: Path, columns: Columns) -> list[int]:

@@ -24,7 +24,7 @@ from .entries import ENTRIES, Columns, Entries, is_grid, read_entries, write_ent
 from .lens_metadata import needs_unwrapping, stated_unwrapping
 from .metadata import METADATA, read_metadata, write_metadata
 from .pictures import Picture, check_exists, read_image
-from .video import claimed_frames, frames
+from .video import VideoReader, frames_of_rows
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +72,7 @@ class Database:
         """Read the panoramas of some rows, or of all. Raw pictures are unwrapped, if the metadata has how.
 
         Args:
-            rows: Which rows; None is all. A video is read from its beginning by each call.
+            rows: Which rows; None is all. A video is read forward from the last frame, and from its beginning for an earlier one.
 
         Returns:
             RGB, or RGBA as the renderers give it. Grey images have three equal channels. Alpha that is opaque in all images of the
@@ -82,6 +82,10 @@ class Database:
             FileError: An image is missing, damaged, or of another size than the first; or how to unwrap it is not known.
         """
         chosen = np.arange(len(self))[slice(None) if rows is None else rows].tolist()
+        if not chosen:
+            return np.empty((0, 0, 0, 3), dtype=np.uint8)
+        if self._reader is not None:
+            return self._frames(self._reader, chosen)
         views = self._pictures(chosen)
         if any(view.shape[2] == 4 for view in views) and self.is_opaque:
             views = [view[..., :3] for view in views]
@@ -91,21 +95,45 @@ class Database:
                     f"{self.folder / self.label(row)} is {_size(view)}, {self.label(chosen[0])} is {_size(views[0])}; "
                     "give images of one size"
                 )
-        height, width = views[0].shape[:2] if views else (0, 0)
-        if views and needs_unwrapping(self.metadata, height, width):
-            unwrapping = stated_unwrapping(self.metadata, height, width, self.folder / METADATA)
-            views = [unwrapping(view) for view in views]
-        return np.stack(views) if views else np.empty((0, 0, 0, 3), dtype=np.uint8)
+        return np.stack([self._panorama(view) for view in views])
 
     def label(self, row: int) -> str:
         """The image of a row, for messages."""
         return self.names[row] or f"frame {self.frames[row]}" if self.frames else str(self.names[row])
 
+    @cached_property
+    def _reader(self) -> VideoReader | None:
+        return None if self.video is None else VideoReader(self.video)
+
+    def passed(self, row: int, limit: int) -> list[int]:
+        """A row, and up to a limit of others that cost little with it: of a video, those whose frames are passed last on the way."""
+        frames, reader = self.frames, self._reader
+        if frames is None or reader is None:
+            return [row]
+        begin = reader.position if frames[row] >= reader.position else 0
+        others = [other for other, each in enumerate(frames) if begin <= each < frames[row]]
+        others.sort(key=lambda other: frames[other])
+        return [*others[max(0, len(others) - limit) :], row]
+
+    def close(self) -> None:
+        """Close the video that is kept open between frames, if there is one. It is opened again when a frame is read."""
+        if self._reader is not None:
+            self._reader.close()
+
+    def _frames(self, reader: VideoReader, rows: list[int]) -> UInt8[np.ndarray, "m height width 3"]:
+        """The panoramas of rows that are frames, unwrapped one by one, as raw frames may be large."""
+        numbers = [(self.frames or ())[row] for row in rows]
+        views = {number: self._panorama(reader.read(number)) for number in sorted(set(numbers))}
+        return np.stack([views[number] for number in numbers])
+
+    def _panorama(self, picture: Picture) -> Picture:
+        height, width = picture.shape[:2]
+        if not needs_unwrapping(self.metadata, height, width):
+            return picture
+        return stated_unwrapping(self.metadata, height, width, self.folder / METADATA)(picture)
+
     def _pictures(self, rows: list[int]) -> list[Picture]:
         """The pictures of rows as they are stored."""
-        if self.frames is not None and self.video is not None:
-            read = dict(frames(self.video, [self.frames[row] for row in rows])) if rows else {}
-            return [read[self.frames[row]] for row in rows]
         paths = [self._path(row) for row in rows]
         with ThreadPoolExecutor() as pool:
             return list(pool.map(read_image, paths))
@@ -204,26 +232,9 @@ def assembled(folder: Path, entries: Entries, metadata: dict[str, Any], headings
     kind = metadata["type"] if metadata.get("type") in KINDS else _guessed_kind(entries.columns)
     if entries.frames is not None:
         check_video_name(folder, metadata)
-        entries = replace(entries, frames=_frames_of_rows(folder / metadata["videoFile"], entries.frames))
+        entries = replace(entries, frames=frames_of_rows(folder / metadata["videoFile"], entries.frames))
     entries = replace(entries, poses=convert(entries.poses, headings, "bearing"))
     return Database(folder=folder, kind=kind, metadata=metadata, **vars(entries))
-
-
-def _frames_of_rows(video: Path, numbers: tuple[int, ...]) -> tuple[int, ...]:
-    """The frame of each row. Some recorders write the counter of a tracker into `Frame`; their rows are the frames in order."""
-    try:
-        count = claimed_frames(video)
-    except FileError:  # reported when the images are read
-        return numbers
-    if len(numbers) != count or max(numbers) < count:
-        return numbers
-    log.warning(
-        "%s: Frame counts to %d and the video has %d frames, as many as there are rows: the rows are taken as its frames in order",
-        video.parent / ENTRIES,
-        max(numbers),
-        count,
-    )
-    return tuple(range(count))
 
 
 def check_video_name(folder: Path, metadata: dict[str, Any]) -> None:

@@ -47,10 +47,14 @@ def _open_database(absolute: Path, folder: Path, stamps: tuple[int, ...], headin
     database = read_database(folder, headings)
     if len(database) == 0:
         raise FileError(f"{folder / ENTRIES} lists no images; give a database that has some")
-    bad = np.flatnonzero(~np.isfinite(database.poses).all(axis=1))
+    missing = ~np.isfinite(database.poses)
+    bad = np.flatnonzero(missing.any(axis=1))
     if len(bad):
         line = database.lines[bad[0]]
-        raise FileError(f"{folder / ENTRIES}, line {line}: the position or heading is missing; each view needs both")
+        remedy = "" if missing[bad[0], :2].any() else "; --headings path takes the direction of a route as its headings"
+        raise FileError(
+            f"{folder / ENTRIES}, line {line}: the position or heading is missing; each view needs both{remedy}"
+        )
     return database
 
 
@@ -66,7 +70,7 @@ def eye_of(route: Path | None, grid: Path | None = None, given: Mapping[str, Any
         InputError: Where the databases have different eyes, or another one than is given.
     """
     folders = [each for each in (route, grid) if each is not None]
-    found = {folder: _recorded_eye(open_database(folder)) for folder in folders}
+    found = {folder: _recorded_eye(open_database(folder, "path")) for folder in folders}  # headings may be missing
     known: dict[str, Any] = {}
     for folder, fields in found.items():
         for name, value in fields.items():
@@ -149,7 +153,7 @@ def reach_of(database: Database) -> float:
 
 def world_of(route: Path, grid: Path | None = None) -> World:
     """A world without triangles for what needs one: its field is the extent of the databases, and a reach around it."""
-    databases = [open_database(each) for each in (route, grid) if each is not None]
+    databases = [open_database(each, "path") for each in (route, grid) if each is not None]  # headings may be missing
     xy = np.concatenate([each.poses[:, :2] for each in databases])
     extent = Bounds(*xy.min(axis=0).tolist(), *xy.max(axis=0).tolist())
     origin = {"route_database": str(route)} | ({} if grid is None else {"grid_database": str(grid)})
@@ -176,6 +180,8 @@ def route_of(folder: Path, headings: str = "auto") -> Route:
     database = open_database(folder, headings)
     if database.kind != "route":
         raise FileError(f"{folder} is a database of a {database.kind}; give one of a route")
+    if len(np.unique(database.poses[:, :2], axis=0)) < 2:
+        raise FileError(f"{folder} has views of one position; a route needs at least 2")
     if headings in ("as-is", "path"):
         return Route(database.poses)
     diagnosis = diagnose(database.poses, "bearing" if headings == "auto" else headings)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from tussock.world.atomic import replacing
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import MAX_COORDINATE, choice, number, settings, text, whole
@@ -19,13 +19,13 @@ from tussock.world.settings import MAX_COORDINATE, choice, number, settings, tex
 from ..eye import Eye
 from ..mask import MIN_BRIGHT, fitted, read_mask
 from .camera import Camera
-from .completing import complete, metadata_of, missing_rows, start_or_resume
+from .completing import check_folder, complete, discard, metadata_of, missing_rows, start_or_resume
 from .database import KINDS, Database, check_video_name, read_database
 from .entries import ENTRIES, FILENAME, HEADING, Columns, X, Y, Z, bearings_in_file, format_decimal
 from .lens_metadata import needs_unwrapping, stated_unwrapping, unwrapper_in
 from .metadata import METADATA, group_in, read_metadata
 from .pictures import Picture, encoded
-from .sources import is_video_file, label, read_panoramas, sample
+from .sources import check_source, is_video_file, label, read_panoramas, sample
 from .taken import Taken, taken_from_folder, taken_from_video
 from .track import Track, read_track
 from .unwrapping import Unwrapping
@@ -88,13 +88,18 @@ def import_database(
         The database, and how many images were written by this call.
 
     Raises:
-        InputError: Anything cannot be read or does not fit together, or `out` holds anything else. Then nothing is changed.
+        InputError: Anything cannot be read or does not fit together, or `out` holds anything else. Then nothing is changed, unless images
+            before one that cannot be read are listed already.
     """
     camera, settings = camera or Camera(), settings or ImportSettings()
+    check_folder(out)
+    check_source(source)
     origin = _metadata_of(source)
     kind = settings.kind or str(origin.get("type", "route"))
     if kind not in KINDS:
         raise FileError(f"{source / METADATA}: the type is {kind!r}; give {' or '.join(KINDS)}")
+    if track is None and not origin:
+        raise FileError(f"there is no table of where the pictures of {source} were taken; give one with --track")
     rows = _rows(track or source / ENTRIES, kind, settings)
     metadata_path = source / METADATA
     if origin.get("videoFile"):
@@ -102,11 +107,26 @@ def import_database(
         source = source / str(origin["videoFile"])
     if is_video_file(source):
         taken = taken_from_video(source, rows, settings.every, settings.start)
+    elif settings.start is not None:
+        raise SettingError(f"a start is the time at which a video begins, and {source} is a folder; leave it out")
     else:
         taken = taken_from_folder(source, rows, settings.every)
     pictures = sample(source, taken.references)
-    shape = pictures[0].shape
     unwrapping = _unwrapping(origin, metadata_path, camera, pictures)
+    return _imported(out, source, taken, pictures[0].shape, unwrapping, kind, settings, progress)
+
+
+def _imported(
+    out: Path,
+    source: Path,
+    taken: Taken,
+    shape: tuple[int, ...],
+    unwrapping: Unwrapping,
+    kind: str,
+    settings: ImportSettings,
+    progress: Progress,
+) -> tuple[Database, int]:
+    """Write the database of pictures of a shape, and return what `import_database` does."""
     seen = _seen(unwrapping, settings.mask, shape)
     height = float(np.median(taken.z)) if settings.height is None else settings.height
     eye = Eye(width=unwrapping.width, height=unwrapping.height, top=unwrapping.top, bottom=unwrapping.bottom, z=height)
@@ -121,7 +141,12 @@ def import_database(
     missing = missing_rows(out, columns)
     missing.sort(key=lambda row: taken.references[row] if isinstance(taken.references[row], int) else row)
     panoramas = read_panoramas(source, [taken.references[row] for row in missing], unwrapping, shape)
-    complete(out, columns, missing, lambda rows: [next(panoramas) for _ in rows], progress, settings.quality)
+    try:
+        complete(out, columns, missing, lambda rows: [next(panoramas) for _ in rows], progress, settings.quality)
+    except InputError:  # with the picture that cannot be read replaced, it is another source, and refused as such
+        if not (out / ENTRIES).exists():
+            discard(out, [METADATA, MASK, *columns[FILENAME]])
+        raise
     return read_database(out), len(missing)
 
 
@@ -148,7 +173,7 @@ def _unwrapping(origin: dict[str, Any], path: Path, camera: Camera, pictures: li
         pictures: Some of the pictures.
     """
     height, width = pictures[0].shape[:2]
-    given = camera.lens != "auto" or camera.centre is not None
+    given = camera.lens != "auto" or any(each is not None for each in (camera.centre, camera.inner, camera.outer))
     if not given and unwrapper_in(origin) and needs_unwrapping(origin, height, width):
         return stated_unwrapping(origin, height, width, path)
     eye = group_in(origin, "tussock", "eye")
@@ -174,7 +199,14 @@ def _seen(unwrapping: Unwrapping, mask: Path | None, shape: tuple[int, ...]) -> 
                 f"{mask} is {drawn.shape[1]} x {drawn.shape[0]}; give a mask of the size of the pictures ({shape[1]} x {shape[0]}) "
                 f"or of the panoramas ({seen.shape[1]} x {seen.shape[0]})"
             )
-        seen &= fitted(drawn, unwrapping.width, unwrapping.height)
+        drawn = fitted(drawn, unwrapping.width, unwrapping.height)
+        log.warning(
+            "%s covers %.0f %% of the panorama: kept as %s of the eye; what is behind is not known",
+            mask,
+            100 * (1 - drawn.mean()),
+            MASK,
+        )
+        seen &= drawn
     if not seen.any():
         raise SettingError(
             "the mask covers the whole panorama; a mask is white where the eye sees, and black where it is covered"

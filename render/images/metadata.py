@@ -53,6 +53,8 @@ def group_in(metadata: dict[str, Any], *names: str) -> dict[str, Any]:
 
 def read_storage(path: Path) -> dict[str, Any]:
     """Read a file of OpenCV's FileStorage: YAML, JSON or XML. Raises FileError; the message names the line if it is known."""
+    if not os.path.isfile(path):
+        raise FileError(f"{path} cannot be read: there is no such file; give YAML, JSON or XML, as OpenCV writes it")
     check_content(path)
     try:
         if path.stat().st_size > MAX_BYTES:

@@ -24,6 +24,7 @@ from .folders import eye_of, first_view, open_database, reach_of, world_of
 from .metadata import group_in
 
 CACHE_BYTES = 256 * 2**20  # of images that are kept once used: an agent stays near an entry for several steps
+SHARE_PASSED = 0.25  # of it for frames of a video that are passed on the way to one
 SAME_PLACE = 1e-9  # m; entries nearer to each other than this have one position, and the heading decides
 BACKEND = "database"
 
@@ -158,6 +159,10 @@ class DatabaseViews:
         missing = wanted[[row not in images for row in wanted.tolist()]]
         for owner, database in enumerate(self._entries.databases):
             part = missing[self._entries.owners[missing] == owner]
+            if len(part) == 1:  # as in a walk; the frames of a video that are passed may be seen next
+                row, first = int(self._entries.rows[part[0]]), int(np.searchsorted(self._entries.owners, owner))
+                passed = database.passed(row, limit=int(SHARE_PASSED * CACHE_BYTES / self._view_bytes))
+                part = np.array([first + each for each in passed if first + each not in self._kept])
             for row, image in zip(part.tolist(), database.views(self._entries.rows[part].tolist()), strict=True):
                 if image.shape[2] < self._channels:
                     raise FileError(
@@ -167,13 +172,19 @@ class DatabaseViews:
         for row, image in images.items():
             self._kept[row] = image
             self._kept.move_to_end(row)
-        while len(self._kept) * self.eye.width * self.eye.height * self._channels > CACHE_BYTES:
+        while len(self._kept) * self._view_bytes > CACHE_BYTES:
             self._kept.popitem(last=False)
         return images
 
+    @property
+    def _view_bytes(self) -> int:
+        return self.eye.width * self.eye.height * self._channels
+
     def close(self) -> None:
-        """Free the images; the source cannot be used afterwards."""
+        """Free the images and close videos; the source cannot be used afterwards."""
         self._kept = None
+        for database in self._entries.databases:
+            database.close()
         if self.training is not self:
             self.training.close()
 

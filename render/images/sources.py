@@ -17,15 +17,18 @@ SAMPLE_FRAMES = 300  # of a video, from which they are taken
 Reference = str | int  # name of a picture, or number of a frame
 
 
+def check_source(path: Path) -> None:
+    """Refuse what is neither a folder nor a video. Raises FileError."""
+    if os.path.isfile(path) and not is_video_file(path):
+        check_content(path)
+        raise FileError(f"{path} is neither a folder of pictures nor a video (AVI, MP4, MOV or MKV); give one of these")
+    if not os.path.exists(path):
+        raise FileError(f"there is no folder or video {path}; give a folder of pictures, or a video")
+
+
 def picture_names(folder: Path) -> list[str]:
     """Names of the pictures in a folder, by the numbers in them: image2 comes before image10. Raises FileError if there are none."""
-    if folder.is_file():
-        check_content(folder)
-        raise FileError(
-            f"{folder} is neither a folder of pictures nor a video (AVI, MP4, MOV or MKV); give one of these"
-        )
-    if not folder.is_dir():
-        raise FileError(f"there is no folder {folder}; give pictures, a folder of pictures, or a video")
+    check_source(folder)
     names = [
         path.name for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
     ]
@@ -65,13 +68,16 @@ def is_frames(references: Sequence[Reference]) -> bool:
     return isinstance(references[0], int)
 
 
-def sample(source: Path, references: Sequence[Reference]) -> list[Picture]:
-    """Some of the pictures, as different as it is cheap to read. Raises FileError where they differ in size."""
+def sampled(references: Sequence[Reference]) -> list[Reference]:
+    """Some of the pictures, as different as it is cheap to read."""
     if is_frames(references):
-        early = [each for each in sorted(set(references)) if int(each) < int(min(references)) + SAMPLE_FRAMES]
-        chosen: Sequence[Reference] = early[:: max(1, len(early) // SAMPLE)]
-    else:
-        chosen = references[:: max(1, len(references) // SAMPLE)]
+        references = [each for each in sorted(set(references)) if int(each) < int(min(references)) + SAMPLE_FRAMES]
+    return list(references[:: max(1, len(references) // SAMPLE)])
+
+
+def sample(source: Path, references: Sequence[Reference]) -> list[Picture]:
+    """The pictures that `sampled` chooses. Raises FileError where they differ in size."""
+    chosen = sampled(references)
     pictures = list(read_pictures(source, chosen))
     for reference, picture in zip(chosen, pictures, strict=True):
         check_alike(source, reference, picture, pictures[0].shape)

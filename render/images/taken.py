@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tussock.world.errors import FileError
+from tussock.world.errors import FileError, SettingError
 
 from .sources import Reference, frames_of, name_in, picture_names
 from .track import Track
@@ -70,6 +70,8 @@ def taken_from_video(video: Path, track: Track, every: int | None, start: float 
 
 def _frame_clock(video: Path, track: Track, start: float | None) -> Float[np.ndarray, " n"]:
     """The frame of each row, which may be between two."""
+    if start is not None and (track.frames is not None or track.times is None):
+        raise SettingError(f"a start is a time in a table, and {track.path} has no times that are used; leave it out")
     if track.frames is not None:
         return track.frames
     if track.times is not None:

@@ -99,7 +99,8 @@ class Panorama:
 
     def __attrs_post_init__(self):
         if self.top <= self.bottom:
-            raise SettingError("Panorama: give bottom < top")
+            top, bottom = math.degrees(self.top), math.degrees(self.bottom)
+            raise SettingError(f"Panorama: bottom is {bottom:g} and top is {top:g} degrees; give bottom < top")
 
     def pixels(self, azimuth: Float[np.ndarray, " width"], elevation: Float[np.ndarray, " height"]) -> Pixels:
         """Where each direction is in the picture; nan above the top and below the bottom."""
