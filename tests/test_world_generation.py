@@ -396,7 +396,9 @@ def test_clearance_is_that_of_looking_at_every_obstacle(seed):
 # Routes
 
 
-@pytest.mark.parametrize("preset", ["scrub", "tiny", "tiny tussock_density=0 grass_density=0 trees=0"])
+@pytest.mark.parametrize(
+    "preset", ["scrub field_width=6 field_depth=6", "tiny", "tiny tussock_density=0 grass_density=0 trees=0"]
+)
 def test_the_cheapest_path_is_that_of_a_search_in_the_whole_field(preset):
     """Also where many paths cost the same, as in an empty field."""
     world = generated(preset, 3)

@@ -85,7 +85,8 @@ class Paths:
 
     def nearest(self, xy: Float[np.ndarray, "2"]) -> int:
         """The node nearest to a position (m)."""
-        squared = sum((self._xy_of_nodes[:, i] - xy[i]) ** 2 for i in (0, 1))
+        x, y = (self._xy_of_nodes - xy).T
+        squared = x * x + y * y
         nearest = np.flatnonzero(squared <= squared.min() * (1 + 1e-9))
         index = nearest[0] if len(nearest) == 1 else KDTree(self._xy_of_nodes).query(xy)[1]  # it decides between equals
         return int(self.nodes[index])

@@ -73,7 +73,7 @@ def grass(p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Gen
     foot, side, length, lean, bend, width, tint = map(np.concatenate, zip(*tufts, strict=True))
     segments = _grass_segments(rows[:, 2])
     per_blade = 2 * segments - 1  # triangles
-    count = blades * per_blade + [0 if flower is None else len(flower[0]) for flower in flowers]
+    count = blades * per_blade + np.array([0 if flower is None else len(flower[0]) for flower in flowers])
     first = count.cumsum() - count  # of each tuft's triangles
     triangles, rgb = np.empty((count.sum(), 3, 3), np.float32), np.empty((count.sum(), 3), np.uint8)
     nth = np.arange(len(of_tuft)) - np.repeat(blades.cumsum() - blades, blades)  # of its tuft
