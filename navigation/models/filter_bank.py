@@ -81,10 +81,11 @@ class FilterBank:
             spectra, filters = torch.fft.rfft(views).permute(2, 0, 1), torch.fft.rfft(self._training).permute(2, 1, 0)
             return torch.fft.irfft(torch.bmm(spectra.conj(), filters), n=self._width, dim=0).movedim(0, 1)
         responses = views.new_empty(len(views), len(self._spectra), self._width)
-        for view, first, (real, imaginary) in self._spectra.products(views):
+        for view, filters, (real, imaginary) in self._spectra.products(views):
+            count = filters.stop - filters.start
             for k in range(len(real)):
-                some = torch.fft.irfft(torch.complex(real[k], imaginary[k]), n=self._width, dim=0).T
-                responses[view + k, first : first + len(some)] = some
+                spectra = torch.complex(real[k, :, :count], imaginary[k, :, :count])
+                responses[view + k, filters] = torch.fft.irfft(spectra, n=self._width, dim=0).T
         return responses.mT
 
 
@@ -127,20 +128,22 @@ class Rotations:
         The rotations are in an order of their own: `responses[:, order]` has them as a view turns.
         """
         width, count = views.shape[2], len(self._even)
-        for start, first, (real, imaginary) in self._spectra.products(views, among):
+        for start, filters, (real, imaginary) in self._spectra.products(views, among):
+            m = filters.stop - filters.start
             if self._biases is not None:  # frequency 0 adds to all rotations alike
-                real[:, 0] += width * self._biases[first : first + real.shape[2]]
-            size = max(1, RESPONSES // (width * real.shape[2]))
+                real[:, 0, :m] += width * self._biases[filters]
+            size = max(1, RESPONSES // (width * m))
             for part, (reals, imaginaries) in enumerate(zip(real.split(size), imaginary.split(size), strict=True)):
                 even, odd = torch.empty_like(reals), torch.empty_like(imaginaries)
                 for k in range(len(reals)):  # one by one, to the same bytes as alone
                     torch.mm(self._even, reals[k], out=even[k])
                     torch.mm(self._odd, imaginaries[k], out=odd[k])
-                responses = torch.empty(len(even), width, even.shape[2], device=views.device)
+                even, odd = even[..., :m], odd[..., :m]
+                responses = torch.empty(len(even), width, m, device=views.device)
                 torch.add(even, odd, out=responses[:, :count])
                 torch.sub(even[:, self._right], odd[:, self._right], out=responses[:, count:])
                 view = start + part * size
-                yield slice(view, view + len(even)), first, responses
+                yield slice(view, view + len(even)), filters.start, responses
 
 
 class NearestFilters(Rotations):

@@ -116,6 +116,7 @@ class PerfectMemory(IncrementalModel):
             return self._nearest_known(views) if self.mask.partial else self._nearest_seen(views, among)
         height, width = views.shape[1:]
         centred = views - self._level
+        assert self._filters is not None
         responses, index = self._filters.nearest(centred, among)
         of_views = energies(centred, None)[:, 0]
         squared = (of_views[:, None] + responses).cpu().numpy()

@@ -21,10 +21,10 @@ def in_batches(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Ten
 def one_by_one(function: Callable[..., torch.Tensor], *of_views: torch.Tensor) -> torch.Tensor:
     """A function of each view, or of what was computed of it, stacked.
 
-    Products of matrices, and Fourier transforms, may round a row differently when there are others. This way a view is scanned to the
-    same bytes as alone.
+    Products of matrices, and Fourier transforms, may round a row differently when there are others, or when it stands elsewhere in
+    memory (so it is copied). This way a view is scanned to the same bytes as alone.
     """
-    return torch.stack([function(*each) for each in zip(*of_views, strict=True)])
+    return torch.stack([function(*(each.clone() for each in of_view)) for of_view in zip(*of_views, strict=True)])
 
 
 def gaussian(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:

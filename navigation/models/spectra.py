@@ -20,6 +20,7 @@ from .rotations import one_by_one
 # Filters, and views, that are multiplied at once: what is computed on the way then stays in the processor's cache
 # (measured on an AMD EPYC with 1 MB of it per core).
 FILTERS, VIEWS = 1000, 16
+COLUMNS = 16  # to a multiple of which those of a product are filled up: all views' begin at a multiple of 64 bytes
 TERMS = 5  # of a sum that are added at once: numbers of rows are filled up to a multiple of it with 0
 SMALL = 2**24  # multiplications; below it, one thread is the quickest
 
@@ -59,7 +60,7 @@ class Spectra:
 
     def products(
         self, views: Float[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> Iterator[tuple[int, int, Float[torch.Tensor, "2 views f filters"]]]:
+    ) -> Iterator[tuple[int, slice, Float[torch.Tensor, "2 views f columns"]]]:
         """Products of views and filters at each frequency, summed over the rows: the transforms of the responses.
 
         Args:
@@ -67,10 +68,10 @@ class Spectra:
             among: The filters to multiply.
 
         Returns:
-            Of some views and filters after the other: the index of the first view, that of the first filter, and the real and the
-            imaginary parts of their products (2, views, f, filters).
+            Of some views and filters after the other: the index of the first view, which filters, and the real and the imaginary
+            parts of their products (2, views, f, columns); columns after those of the filters are 0.
         """
-        transformed = one_by_one(lambda view: torch.fft.rfft(view.clone()), views)
+        transformed = one_by_one(torch.fft.rfft, views)
         # For each view two rows: Im(conj(V) F) is Re(conj(iV) F).
         rows = torch.stack([_rows(transformed), _rows(1j * transformed)], dim=2)  # (f, n, 2, 2 h)
         start, stop, _ = among.indices(len(self))
@@ -79,7 +80,7 @@ class Spectra:
             if inside[0] < inside[1]:
                 for view in range(0, len(views), VIEWS):
                     some = rows[:, view : view + VIEWS].contiguous()
-                    yield view, first + inside[0], _multiplied(some, block.storage, *inside)
+                    yield view, slice(first + inside[0], first + inside[1]), _multiplied(some, block.storage, *inside)
 
 
 def _rows(spectra: torch.Tensor) -> Float[torch.Tensor, "f n parts"]:
@@ -96,30 +97,31 @@ def _columns(spectra: torch.Tensor) -> Float[torch.Tensor, "f parts m"]:
 
 
 def _multiplied(rows: torch.Tensor, filters: torch.Tensor, first: int, last: int) -> torch.Tensor:
-    """The product of matrices rows (f, n, 2, k) x filters (f, k, first to last) at each frequency, as (2, n, f, last - first)."""
+    """The product of matrices rows (f, n, 2, k) x filters (f, k, first to last) at each frequency, as (2, n, f, columns)."""
     frequencies, n, _, terms = rows.shape
     if rows.device.type != "cpu":
         products = torch.bmm(rows.flatten(1, 2), filters[:, :, first:last])
-        return products.unflatten(1, (n, 2)).permute(2, 1, 0, 3)
-    products = torch.empty(2, n, frequencies, last - first, dtype=rows.dtype)
-    arrays = rows.numpy(), filters.numpy(), first, products.numpy()
+        products = products.unflatten(1, (n, 2)).permute(2, 1, 0, 3)
+        return torch.nn.functional.pad(products, (0, (first - last) % COLUMNS))
+    products = torch.empty(2, n, frequencies, last - first + (first - last) % COLUMNS, dtype=rows.dtype)
+    arrays = rows.numpy(), filters.numpy(), first, last, products.numpy()
     large = 2 * rows[..., 0].numel() * terms * (last - first) >= SMALL
     in_threads(lambda begin, end: _multiply(*arrays, begin, end), frequencies, torch.get_num_threads() if large else 1)
     return products
 
 
 @compiled(fastmath={"contract"})
-def _multiply(rows, filters, first, products, begin, end):
+def _multiply(rows, filters, first, last, products, begin, end):
     """The same for frequencies `begin` to `end`. Loops are unrolled: a number, once loaded, is used for two rows and TERMS terms."""
-    _, n, _, m = products.shape
+    n, m = products.shape[1], last - first
     products[:, :, begin:end] = 0
     for f in range(begin, end):
         for k in range(0, rows.shape[3], TERMS):
-            f0 = filters[f, k, first : first + m]
-            f1 = filters[f, k + 1, first : first + m]
-            f2 = filters[f, k + 2, first : first + m]
-            f3 = filters[f, k + 3, first : first + m]
-            f4 = filters[f, k + 4, first : first + m]
+            f0 = filters[f, k, first:last]
+            f1 = filters[f, k + 1, first:last]
+            f2 = filters[f, k + 2, first:last]
+            f3 = filters[f, k + 3, first:last]
+            f4 = filters[f, k + 4, first:last]
             for v in range(n):
                 real, imaginary = products[0, v, f], products[1, v, f]
                 a, b = rows[f, v, 0, k : k + TERMS], rows[f, v, 1, k : k + TERMS]
