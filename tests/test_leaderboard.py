@@ -24,7 +24,7 @@ from tussock.navigation.experiment_keys import ROUTE_SETTINGS
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.scan import best_turn, scan_window
-from tussock.navigation.sweeps.work import learn, walk
+from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import InputError
 
@@ -443,9 +443,9 @@ def test_a_measured_result_is_obtained_again():
     then = measured.runs[1]
     assert (run.world, run.seed, run.body.heading_noise, run.start_offset) == ("tussock-field", 1000, 0.0, 0.0)
     assert then.asked == ("tussock-field", 1000, 0.0, 0.0)
-    trained = learn(run, run.open_world_and_route())
+    trained = learn(run, draw(run, run.open_world_and_route()))
     with trained.renderer:
-        now = walk(run, trained).results
+        now = walk([run], trained)[0].results
     assert now["arrived"] == then.arrived
     assert now["mean_deviation_m"] == pytest.approx(then.mean_deviation_m, abs=0.01)
 

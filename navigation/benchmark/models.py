@@ -13,7 +13,7 @@ from ..models import model_spec
 from ..models.base import FamiliarityModel
 from ..sweeps.store import Store
 from ..sweeps.sweep import run_sweep
-from ..sweeps.work import walk
+from ..sweeps.work import draw, learn, walk
 from .definition import BENCHMARK, ENCODING, Benchmark
 from .results import Result, check_free, result_of, write_result
 
@@ -95,14 +95,14 @@ def enter(
     chain = benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding):
-        world, route = runs[0].open_world_and_route()
-        with runs[0].open_renderer(world) as renderer:
-            trained = runs[0].train(renderer, route, model=make(runs[0].seed))
-            for run in runs:
-                walked = walk(run, trained)
+        drawn = draw(runs[0], runs[0].open_world_and_route())
+        with drawn.renderer:
+            for walked in walk(runs, learn(runs[0], drawn, make(runs[0].seed))):
+                if isinstance(walked, Exception):
+                    raise walked
                 times = {"seconds": walked.seconds, "learn_seconds": walked.learn_seconds}
                 results.append(walked.results | times | {"error": walked.refused})
-                done.append(run)
-                progress(len(done), len(benchmark))
+        done += runs
+        progress(len(done), len(benchmark))
     result = result_of(benchmark, name, chain, done, results)
     return result, write_result(result, out, benchmark)
