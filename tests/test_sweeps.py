@@ -443,7 +443,7 @@ def scheduler(workers: int) -> Iterator[tuple[str, subprocess.Popen]]:
 def test_a_killed_worker_loses_nothing_and_all_listen_on_this_machine_only(tmp_path):
     with running(written(tmp_path, MANY), tmp_path / "out") as process:
         below = psutil.Process(process.pid).children(recursive=True)
-        workers = [each for each in below if any("spawn_main" in word for word in each.cmdline())]
+        workers = [each for each in below if "tussock.navigation.sweeps.work" in " ".join(each.parent().cmdline())]
         listening = [
             c.laddr.ip
             for each in [psutil.Process(process.pid), *workers]

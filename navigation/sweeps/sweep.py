@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import dask.config
 import numpy as np
 from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
@@ -27,6 +28,7 @@ from . import work
 from .spec import Sweep
 from .store import Finished, Store, table_of, write_table
 from .work import Walked, draw, learn, walk
+from .workers import METHOD, WORK, prepare_workers
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +41,7 @@ LOCAL: dict[str, Any] = {  # options of the workers on this machine, which nobod
     "threads_per_worker": 1,
     "memory_limit": None,
     "silence_logs": logging.CRITICAL,
-    "preload": [work.__name__],
+    "preload": [WORK],
     "host": "127.0.0.1",
     **dict.fromkeys(("dashboard_address", "worker_dashboard_address"), "127.0.0.1:0"),
 }
@@ -201,6 +203,8 @@ def cluster(workers: str | int | None) -> Iterator[Client]:
         if isinstance(workers, str):
             scheduler = workers
         else:
+            prepare_workers()
+            stack.enter_context(dask.config.set({"distributed.worker.multiprocessing-method": METHOD}))
             local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)
             scheduler = stack.enter_context(local).scheduler_address
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are reported in one line, below
