@@ -13,6 +13,7 @@ from typing import Any
 
 import dask.config
 import numpy as np
+from dask.base import tokenize
 from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
@@ -134,25 +135,26 @@ def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[t
     """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
     waiting, tasks = as_completed(loop=client.loop, raise_errors=False), _tasks(client, missing)
     futures: dict[Future, list[str]] = {}
-    while True:
-        for future, keys in islice(tasks, max(0, QUEUED * _workers(client) - len(futures))):
-            futures[future] = keys
-            waiting.add(future)
-        if not futures:
-            return
+    gone: Exception | None = None
+    while gone is None:
         results = []
-        for future in waiting.next_batch(block=True):
-            try:
+        try:
+            for future, keys in islice(tasks, max(0, QUEUED * _workers(client) - len(futures))):
+                futures[future] = keys
+                waiting.add(future)
+            if not futures:
+                return
+            for future in waiting.next_batch(block=True):
                 error, keys = future.exception(), futures[future]
                 results += zip(keys, [error] * len(keys) if error is not None else future.result(), strict=True)
                 del futures[future]
-            except (CancelledError, CommClosedError) as gone:
-                yield results
-                raise MissingDependencyError(
-                    "the scheduler is gone; all runs that were finished are kept: give the same command again"
-                ) from gone
-            future.release()
+                future.release()
+        except (CancelledError, CommClosedError, OSError) as lost:
+            gone = lost
         yield results
+    raise MissingDependencyError(
+        "the scheduler is gone; all runs that were finished are kept: give the same command again"
+    ) from gone
 
 
 def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Future, list[str]]]:
@@ -171,22 +173,21 @@ def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Fut
             key = key_of_step(first)
             needs[key] = earlier.get(key) or client.submit(step, first, *given, key=key, **options)
             given = [needs[key]]
-        yield client.submit(walk, runs, *given, key=f"walks-{keys[0]}", **options), keys
+        yield client.submit(walk, runs, *given, key=f"walks-{tokenize(*keys)}", **options), keys
 
 
 def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
     """Which runs walk together, as keys: runs of one trained model, so many that all workers are busy. One world after the other."""
     groups: dict[tuple[str, ...], list[str]] = {}
+    first: dict[str, int] = {}  # when a world, views and a model are first needed
     for key, run in runs.items():
-        groups.setdefault((route_key(run), views_key(run), training_key(run)), []).append(key)
-    first: dict[str, int] = {}
-    for number, names in enumerate(groups):
+        names = route_key(run), views_key(run), training_key(run)
+        groups.setdefault(names, []).append(key)
         for name in names:
-            first.setdefault(name, number)
+            first.setdefault(name, len(first))
     size = min(MAX_TOGETHER, math.ceil(len(runs) / (PARTS * workers)))
     parts = []
-    for names in sorted(groups, key=lambda names: [first[name] for name in names]):
-        group = groups[names]
+    for _, group in sorted(groups.items(), key=lambda item: [first[name] for name in item[0]]):
         parts += [part.tolist() for part in np.array_split(group, max(1, round(len(group) / size)))]
     return parts
 
