@@ -10,7 +10,7 @@ settings that it consists of, and nowhere else. Importing this module is light: 
 import logging
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from .walk import Step, Walk
 
 log = logging.getLogger(__name__)
-
 MODEL_SUFFIX = ".safetensors"  # of files of trained models
 
 
@@ -212,11 +211,9 @@ class Experiment(Surroundings):
 
     def training_views(self, renderer: "Renderer", route: "Route", progress: Progress = no_progress) -> "TrainingViews":
         """The encoded views that are learned, and their poses; see `training_views` of training.py."""
-        from .threads import threads
-        from .training import training_views
+        from .training import training_views as draw
 
-        with threads(self.threads):
-            return training_views(self.encoding, renderer, self.training_poses(renderer.world, route), progress)
+        return draw(self.encoding, renderer, self.training_poses(renderer.world, route), progress)
 
     def training_poses(self, world: "World", route: "Route"):
         """(n, 3) Poses that views are learned at; see `training_poses` and, for databases, `training_poses_in`."""
@@ -245,20 +242,16 @@ class Experiment(Surroundings):
 
     def steps(self, trained: "TrainedNavigator") -> Iterator[tuple["Step", "Diagnosis | None"]]:
         """Walk: each step as it is made, and what is wrong with it."""
-        for (step,) in steps_of([self], trained):
-            assert step is not None
-            yield step
+        yield from (step for (step,) in steps_of([self], trained) if step is not None)
 
     @contextmanager
     def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
         """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
         from .walk import check_inside
 
-        with ExitStack() as stack:
-            world = self.open_world()
-            route = self.open_route(world)
-            check_inside(self.start(route), world)  # before the work begins
-            renderer = stack.enter_context(self.open_renderer(world))
+        world, route = self.open_world_and_route()
+        check_inside(self.start(route), world)  # before the work begins
+        with self.open_renderer(world) as renderer:
             log.info(f"renderer: {renderer.backend}")
             yield self.train(renderer, route, progress)
 
@@ -281,7 +274,7 @@ class Experiment(Surroundings):
 
 def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Route") -> "Walk":
     """The walk of agents side by side, one for each experiment. These have the same eye and encoding."""
-    import numpy as np
+    from numpy.random import default_rng
 
     from .walk import Walk
 
@@ -292,7 +285,7 @@ def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Rou
         starts=[each.start(route) for each in experiments],
         body=[each.body for each in experiments],
         stopping=[each.stopping for each in experiments],
-        noise=[np.random.default_rng(each.seed) for each in experiments],
+        noise=[default_rng(each.seed) for each in experiments],
     )
 
 
@@ -302,7 +295,6 @@ def steps_of(
     """Walk side by side what has the same `training_key`; a list with what `Experiment.steps` gives, or None for a walk that has ended."""
     from .threads import threads
 
-    examine = trained.diagnostics.examine
     with threads(experiments[0].threads):
         for steps in walk_of(experiments, trained.renderer, trained.route).steps(trained.navigator):
-            yield [None if step is None else (step, examine(step)) for step in steps]
+            yield [None if step is None else (step, trained.diagnostics.examine(step)) for step in steps]

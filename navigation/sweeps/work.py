@@ -18,6 +18,7 @@ from ..experiment import Experiment, TrainedNavigator, steps_of
 from ..failures import Cause
 from ..models.base import memory_bytes
 from ..registry import registry
+from ..threads import threads
 from ..trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -83,7 +84,8 @@ def draw(experiment: Experiment, path: tuple[World, Route]) -> Drawn:
     """The views that an experiment learns."""
     began, (world, route) = time.perf_counter(), path
     renderer = experiment.open_renderer(world)
-    views = experiment.training_views(renderer, route) if isinstance(experiment.model, Spec) else None
+    with threads(experiment.threads):
+        views = experiment.training_views(renderer, route) if isinstance(experiment.model, Spec) else None
     return Drawn(renderer=renderer, route=route, views=views, seconds=time.perf_counter() - began)
 
 
