@@ -9,8 +9,8 @@ settings that it consists of, and nowhere else. Importing this module is light: 
 
 import logging
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from .failures import Diagnosis
     from .models.base import FamiliarityModel
     from .models.files import TrainedModel
+    from .training import TrainingViews
     from .trajectory import Trajectory
     from .walk import Step, Walk
 
 log = logging.getLogger(__name__)
-
 MODEL_SUFFIX = ".safetensors"  # of files of trained models
 
 
@@ -161,7 +161,13 @@ class Experiment(Surroundings):
         return route.start.moved(0.0, self.start_offset)
 
     def train(
-        self, renderer: "Renderer", route: "Route", progress: Progress = no_progress, *, model: Any = None
+        self,
+        renderer: "Renderer",
+        route: "Route",
+        progress: Progress = no_progress,
+        *,
+        model: Any = None,
+        views: "TrainingViews | None" = None,
     ) -> "TrainedNavigator":
         """Let a navigator learn the route, unless its model comes from a file.
 
@@ -170,11 +176,11 @@ class Experiment(Surroundings):
             route: Through it.
             progress: Called with how many training views are drawn, of how many.
             model: An untrained model to take in place of the experiment's, told what the eye sees.
+            views: The training views, as `training_views` gives them, where they are drawn already.
         """
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
-        from .training import training_views
 
         began = time.perf_counter()
         with threads(self.threads):
@@ -182,12 +188,13 @@ class Experiment(Surroundings):
                 loaded = load_model(self.model, device=self.device)
                 self.check_matches(loaded)
                 navigator = self.navigator.make(model=loaded.model)
-                poses = loaded.poses
+                images, poses = None, loaded.poses
             else:
                 navigator = self.navigator.make(model=self.make_model() if model is None else model)
-                wanted = self.training_poses(renderer.world, route)
-                views, poses = training_views(self.encoding, renderer, wanted, progress)
-                navigator.learn(views)
+                images, poses = views or self.training_views(renderer, route, progress)
+                navigator.learn(
+                    images.clone()
+                )  # others learn these views, too, and a model of the user's may change them
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):
@@ -198,8 +205,15 @@ class Experiment(Surroundings):
             navigator=navigator,
             model=trained,
             poses=poses,
+            views=images,
             seconds=time.perf_counter() - began,
         )
+
+    def training_views(self, renderer: "Renderer", route: "Route", progress: Progress = no_progress) -> "TrainingViews":
+        """The encoded views that are learned, and their poses; see `training_views` of training.py."""
+        from .training import training_views as draw
+
+        return draw(self.encoding, renderer, self.training_poses(renderer.world, route), progress)
 
     def training_poses(self, world: "World", route: "Route"):
         """(n, 3) Poses that views are learned at; see `training_poses` and, for databases, `training_poses_in`."""
@@ -224,37 +238,20 @@ class Experiment(Surroundings):
 
     def walk(self, renderer: "Renderer", route: "Route") -> "Walk":
         """The walk of one agent along a route, to be steered by a navigator."""
-        from .walk import Walk
-
-        return Walk(
-            renderer=renderer,
-            encoding=self.encoding,
-            route=route,
-            starts=[self.start(route)],
-            body=self.body,
-            stopping=self.stopping,
-            noise=self.seed,
-        )
+        return walk_of([self], renderer, route)
 
     def steps(self, trained: "TrainedNavigator") -> Iterator[tuple["Step", "Diagnosis | None"]]:
         """Walk: each step as it is made, and what is wrong with it."""
-        from .threads import threads
-
-        with threads(self.threads):
-            for (step,) in self.walk(trained.renderer, trained.route).steps(trained.navigator):
-                assert step is not None
-                yield step, trained.diagnostics.examine(step)
+        yield from (step for (step,) in steps_of([self], trained) if step is not None)
 
     @contextmanager
     def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
         """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
         from .walk import check_inside
 
-        with ExitStack() as stack:
-            world = self.open_world()
-            route = self.open_route(world)
-            check_inside(self.start(route), world)  # before the work begins
-            renderer = stack.enter_context(self.open_renderer(world))
+        world, route = self.open_world_and_route()
+        check_inside(self.start(route), world)  # before the work begins
+        with self.open_renderer(world) as renderer:
             log.info(f"renderer: {renderer.backend}")
             yield self.train(renderer, route, progress)
 
@@ -273,3 +270,31 @@ class Experiment(Surroundings):
                 trajectory.add(step, diagnosis)
                 progress(step.index, limit)
         return trajectory
+
+
+def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Route") -> "Walk":
+    """The walk of agents side by side, one for each experiment. These have the same eye and encoding."""
+    from numpy.random import default_rng
+
+    from .walk import Walk
+
+    return Walk(
+        renderer=renderer,
+        encoding=experiments[0].encoding,
+        route=route,
+        starts=[each.start(route) for each in experiments],
+        body=[each.body for each in experiments],
+        stopping=[each.stopping for each in experiments],
+        noise=[default_rng(each.seed) for each in experiments],
+    )
+
+
+def steps_of(
+    experiments: Sequence[Experiment], trained: TrainedNavigator
+) -> Iterator[list["tuple[Step, Diagnosis | None] | None"]]:
+    """Walk side by side what has the same `training_key`; a list with what `Experiment.steps` gives, or None for a walk that has ended."""
+    from .threads import threads
+
+    with threads(experiments[0].threads):
+        for steps in walk_of(experiments, trained.renderer, trained.route).steps(trained.navigator):
+            yield [None if step is None else (step, trained.diagnostics.examine(step)) for step in steps]

@@ -36,6 +36,10 @@ ROUTE_SETTINGS = (
     "route_database",
     "grid_database",
 )  # decide world and route
+VIEW_SETTINGS = (  # decide with these the views that are learned
+    "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "mask", "threads",
+    "encoding", "resize", "blur", "spacing_m", "every", "learning_walk_m",
+)  # fmt: skip
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
 )  # fmt: skip
@@ -51,6 +55,12 @@ def route_key(experiment: Experiment) -> str:
     return "path-" + _digest(experiment, ROUTE_SETTINGS)
 
 
+def views_key(experiment: Experiment) -> str:
+    """A digest of what decides the training views of a run; a model from a file learns none."""
+    learned = "views-" if isinstance(experiment.model, Spec) else "no-views-"
+    return learned + _digest(experiment, (*ROUTE_SETTINGS, *VIEW_SETTINGS))
+
+
 def training_key(experiment: Experiment) -> str:
     """A digest of what decides the training of a run."""
     return "training-" + _digest(experiment, [name for name in TYPES if name not in WALK_SETTINGS])
@@ -61,8 +71,9 @@ def _digest(experiment: Experiment, names: Collection[str]) -> str:
     kept: dict[str, Any] = {name: settings[name] for name in sorted(names)}
     kept |= {name: experiment.seed if kept[name] is None else kept[name] for name in ("world_seed", "route_seed")}
     if "encoding" in names:  # of what is learned: classes by what they are, whatever their names in this process
-        model = experiment.model
         kept["encoding"] = experiment.encoding.text_in_files()
+    if "model" in names:
+        model = experiment.model
         kept["model"] = content_of(model) if isinstance(model, Path) else _in_files(model, MODELS)
         kept["navigator"] = _in_files(experiment.navigator, NAVIGATORS)
     if "mask" in names and experiment.eye.mask is not None:

@@ -20,6 +20,7 @@ from .models.files import TrainedModel
 
 log = logging.getLogger(__name__)
 
+TrainingViews = tuple[Float32[torch.Tensor, "m h w"], Float[np.ndarray, "m 3"]]  # encoded, and their poses
 AHEAD = 0.3  # m; a view next to the route faces the route this far ahead
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
 BATCH = 64  # views rendered and encoded at once
@@ -111,7 +112,7 @@ def training_source(renderer: Renderer) -> Renderer:
 
 def training_views(
     encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"], progress: Progress = no_progress
-) -> tuple[Float32[torch.Tensor, "m h w"], Float[np.ndarray, "m 3"]]:
+) -> TrainingViews:
     """The encoded views at poses, and the poses of those that are worth learning.
 
     A view without contrast is left out, as where a plant covers the eye: it holds nothing to recognise, yet after normalising it lies

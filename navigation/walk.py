@@ -81,7 +81,7 @@ class Step:
 
 
 class Walk:
-    """Agents that follow one route side by side, under the same rules.
+    """Agents that follow one route side by side.
 
     What they see is drawn, encoded and compared together, which takes a fraction of the time; each takes the steps that it takes
     alone (but for rounding, where the model keeps no views).
@@ -94,8 +94,8 @@ class Walk:
         encoding: Encoding,
         route: Route,
         starts: Sequence[Pose],
-        body: Body | None = None,
-        stopping: StoppingRules | None = None,
+        body: Body | Sequence[Body] | None = None,
+        stopping: StoppingRules | Sequence[StoppingRules] | None = None,
         noise: int | Sequence[np.random.Generator] = 0,
     ):
         """Put agents at the start of a walk.
@@ -105,23 +105,24 @@ class Walk:
             encoding: What is kept of a view.
             route: The route that they are to follow.
             starts: Where each of them begins.
-            body: How they move.
-            stopping: When each walk ends.
+            body: How they move: all of them, or one for each.
+            stopping: When their walks end: likewise.
             noise: What the noise on the turns is drawn from: a generator for each agent, or a seed (agent k takes seed + k).
 
         Raises:
             SettingError: For a start outside of the world, off its ground, or off the grid of an image database.
         """
         self.renderer, self.encoding, self.route = renderer, encoding.for_eye(renderer.eye), route
-        self.body, self.stopping = body or Body(), stopping or StoppingRules()
         self.world = renderer.world
-        self.step_limit = self.stopping.step_limit(route.length, self.body.step_length)
+        bodies = body if isinstance(body, Sequence) else [body or Body()] * len(starts)
+        rules = stopping if isinstance(stopping, Sequence) else [stopping or StoppingRules()] * len(starts)
         generators = (
             [np.random.default_rng(noise + k) for k in range(len(starts))]
             if isinstance(noise, int | np.integer)
             else noise
         )
-        self.agents = [Walker(self, *each) for each in zip(range(len(starts)), starts, generators, strict=True)]
+        each = zip(range(len(starts)), starts, bodies, rules, generators, strict=True)
+        self.agents = [Walker(self, *of_agent) for of_agent in each]
         self.reach = renderer.reach if isinstance(renderer, DatabaseViews) else np.inf
         self._views: UInt8[np.ndarray, "n height width channels"] | None = None
         self._measure(self.agents)
@@ -179,11 +180,14 @@ class Walk:
 class Walker:
     """Where one agent of a walk is, and what it has done so far."""
 
-    def __init__(self, walk: Walk, number: int, start: Pose, random: np.random.Generator):
+    def __init__(
+        self, walk: Walk, number: int, start: Pose, body: Body, stopping: StoppingRules, random: np.random.Generator
+    ):
         check_inside(start, walk.world)
-        self.walk, self.number, self.random = walk, number, random
+        self.walk, self.number, self.body, self.stopping, self.random = walk, number, body, stopping, random
         self.pose = Pose(start.x, start.y, float(wrap_angle(start.heading)))
-        self.stop_check = StopCheck(walk.stopping, walk.route, walk.world.field, walk.body.step_length)
+        self.step_limit = stopping.step_limit(walk.route.length, body.step_length)
+        self.stop_check = StopCheck(stopping, walk.route, walk.world.field, body.step_length)
         self.index, self.ended = 0, False
         self.reset: StopReason | None = None
         self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
@@ -218,16 +222,16 @@ class Walker:
         self.reason = self.stop_check.check(self.pose, deviation, along) or self.stopped
         if self.reason is not StopReason.ARRIVED and (self.view_distance or 0.0) > self.walk.reach:
             self.reason = StopReason.OFF_GRID
-        if self.reason is None and self.index >= self.walk.step_limit:
+        if self.reason is None and self.index >= self.step_limit:
             self.reason = StopReason.OUT_OF_STEPS
 
     def step(self, motion: Motion, row: int, view: np.ndarray | None) -> Step:
         """Do as a row of a motion says."""
-        stopping, body, pose, scan = self.walk.stopping, self.walk.body, self.pose, motion.scan
+        stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
         aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
         noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
         turn = float(wrap_angle(aim + noise))
-        put_back = stopping.put_back and self.reason in RECOVERABLE and self.index < self.walk.step_limit
+        put_back = stopping.put_back and self.reason in RECOVERABLE and self.index < self.step_limit
         step = Step(
             index=self.index,
             pose=pose,

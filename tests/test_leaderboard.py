@@ -25,7 +25,7 @@ from tussock.navigation.experiment_keys import ROUTE_SETTINGS
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.scan import best_turn, scan_window
-from tussock.navigation.sweeps.work import learn, walk
+from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import InputError
 
@@ -46,7 +46,7 @@ DIGESTS = {
 @pytest.fixture(scope="module")
 def entered(tmp_path_factory, cluster) -> tuple[Result, Path]:
     """Perfect memory, as the command enters it."""
-    return enter_named("perfect-memory", tmp_path_factory.mktemp("entered"), benchmark=TINY, workers=cluster)
+    return enter_named(["perfect-memory"], tmp_path_factory.mktemp("entered"), benchmark=TINY, workers=cluster)[0]
 
 
 def line(
@@ -159,10 +159,10 @@ def test_a_second_time_gives_the_same_bytes_but_for_the_times(entered, tmp_path)
     def without_times(path):
         return re.sub(r'"times": \{[^}]*\}', "", path.read_text())
 
-    _, again = enter_named("perfect-memory", tmp_path, benchmark=TINY, workers=1)  # in a process of its own
+    ((_, again),) = enter_named(["perfect-memory"], tmp_path, benchmark=TINY, workers=1)  # in a process of its own
     assert without_times(again) == without_times(entered[1])
     before = again.read_bytes()
-    enter_named("perfect-memory ", tmp_path, benchmark=TINY)  # every run is kept: nothing is left to do
+    enter_named(["perfect-memory "], tmp_path, benchmark=TINY)  # every run is kept: nothing is left to do
     assert again.read_bytes() == before
 
 
@@ -230,7 +230,7 @@ def test_a_learner_may_see_the_panorama(tmp_path):
 
 
 def test_runs_that_cannot_be_done_have_not_arrived(tmp_path, cluster):
-    result, _ = enter_named("infomax rate=1e6", tmp_path, benchmark=TINY, workers=cluster)
+    ((result, _),) = enter_named(["infomax rate=1e6"], tmp_path, benchmark=TINY, workers=cluster)
     totals = result.scores()["totals"]
     assert (totals["arrived"], totals["could_not_run"], totals["mean_deviation_m"]) == (0, 4, None)
     assert "rate" in (result.runs[0].error or "")
@@ -263,7 +263,7 @@ def test_results_of_another_version_are_not_replaced(entered, tmp_path):
     before = path.read_bytes()
     for other in (dataclasses.replace(TINY, name="tiny-2"), dataclasses.replace(TINY, name="tiny-1-quick")):
         with pytest.raises(InputError, match=r"holds a result of tiny-1 .+ give another --out"):
-            enter_named("perfect-memory", tmp_path, benchmark=other)
+            enter_named(["perfect-memory"], tmp_path, benchmark=other)
         with pytest.raises(InputError, match="holds a result of tiny-1 "):
             enter(lambda seed: make_model("random", seed=seed), "Perfect memory", tmp_path, benchmark=other)
     with pytest.raises(InputError, match="Perfect memory"):  # another entry, whose file would have this name
@@ -451,9 +451,9 @@ def test_a_measured_result_is_obtained_again():
     then = measured.runs[1]
     assert (run.world, run.seed, run.body.heading_noise, run.start_offset) == ("tussock-field", 1000, 0.0, 0.0)
     assert then.asked == ("tussock-field", 1000, 0.0, 0.0)
-    trained = learn(run, run.open_world_and_route())
+    trained = learn(run, draw(run, run.open_world_and_route()))
     with trained.renderer:
-        now = walk(run, trained).results
+        now = walk([run], trained)[0].results
     assert now["arrived"] == then.arrived
     assert now["mean_deviation_m"] == pytest.approx(then.mean_deviation_m, abs=0.01)
 

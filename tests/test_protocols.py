@@ -35,7 +35,7 @@ from tussock.navigation.studies.protocols import (
 )
 from tussock.navigation.studies.protocols.azevedo2025 import of_walk
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
-from tussock.navigation.sweeps.work import learn, walk
+from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
 from tussock.world.files import write_world
@@ -226,7 +226,7 @@ def test_a_route_has_the_length_that_it_has(tmp_path):
         )
         path = run.open_world_and_route()
         assert path[1].length < 5
-        assert walk(run, learn(run, path)).results["route_m"] == path[1].length
+        assert walk([run], learn(run, draw(run, path)))[0].results["route_m"] == path[1].length
 
 
 def test_routes_with_the_same_file_name_have_different_names():

@@ -26,17 +26,19 @@ from PIL import Image
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
-from tussock.navigation.experiment_keys import key_of
+from tussock.navigation.experiment_keys import key_of, training_key
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.reports.report import Drawing
+from tussock.navigation.sweeps.spec import Sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
-from tussock.navigation.sweeps.sweep import finished_run, record_again
+from tussock.navigation.sweeps.sweep import MAX_TOGETHER, finished_run, record_again, run_sweep, side_by_side
 from tussock.navigation.sweeps.sweep_file import read_sweep
-from tussock.navigation.sweeps.work import Walked
+from tussock.navigation.sweeps.work import Walked, draw, learn, walk
 from tussock.navigation.sweeps.worst import walk_section
+from tussock.navigation.trajectory import Trajectory
 from tussock.render.eye import Eye
 from tussock.world.errors import InputError
 
@@ -144,6 +146,77 @@ def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
     }
     shuffled = dict(np.random.default_rng(0).permutation(list(rows.items())).tolist())
     assert table_of(shuffled).equals(table_of(rows))
+
+
+# Runs that walk together
+
+ALONE = Experiment(world="tiny", eye=Eye(width=60, height=12), model="random", threads=1)
+
+
+def walked(runs: list[Experiment]) -> list[Walked | Exception]:
+    """The results of runs that walk together."""
+    drawn = draw(runs[0], runs[0].open_world_and_route())
+    with drawn.renderer:
+        return walk(runs, learn(runs[0], drawn))
+
+
+def test_runs_that_walk_together_have_the_results_that_they_have_alone():
+    changes = [
+        {},
+        {"start_offset": 0.1, "body__heading_noise": 0.3},
+        {"body__step_length": 0.08, "stopping__max_steps": 7},
+        {"body__heading_noise": 0.6, "stopping__put_back": True, "stopping__max_deviation": 0.2},
+        {"stopping__arrival_radius": 0.4, "stopping__patience": 0.5},
+    ]
+    runs = [ALONE.replace(**change) for change in changes]
+    assert len({training_key(run) for run in runs}) == 1
+    together, alone = walked(runs), [walked([run])[0] for run in runs]
+    assert [each.steps for each in together] == [each.steps for each in alone]
+    assert [each.results for each in together] == [each.results for each in alone]
+    assert len({each.steps for each in together}) == len(runs)
+
+
+@pytest.mark.parametrize("kind", [InputError, ZeroDivisionError])
+def test_a_run_that_fails_or_cannot_start_does_not_stop_those_beside_it(monkeypatch, kind):
+    def add(self, step, diagnosis=None, add=Trajectory.add):
+        if len(self) == 1 and step.deviation > 0.15:
+            raise kind("too far")
+        add(self, step, diagnosis)
+
+    runs = [ALONE.replace(start_offset=offset, stopping__max_steps=3) for offset in (0.0, 40.0, 0.25, 0.05)]
+    expected = [walked([run])[0].steps for run in (runs[0], runs[3])]
+    monkeypatch.setattr(Trajectory, "add", add)
+    good, outside, failed, other = walked(runs)
+    assert [good.steps, other.steps] == expected
+    assert "outside the world" in outside.refused
+    assert isinstance(failed, InputError if kind is InputError else RuntimeError)
+    assert str(failed) == "too far"
+
+
+def test_views_are_drawn_once_for_all_models_and_worlds_opened_once(monkeypatch, tmp_path, cluster):
+    done = []
+    for name in ("training_views", "open_world"):
+        method = getattr(Experiment, name)
+        monkeypatch.setattr(
+            Experiment, name, lambda *given, name=name, method=method: done.append(name) or method(*given)
+        )
+    axes = {"model": ["perfect-memory", "random"], "seed": [0, 1], "start_offset": [0.0, 0.1]}
+    assert run_sweep(Sweep.over("", ALONE, axes), tmp_path, workers=cluster)["could_not_run"] == 0
+    assert sorted(done) == ["open_world"] * 2 + ["training_views"] * 2
+
+
+@pytest.mark.parametrize("workers", [1, 2, 7])
+def test_runs_of_one_model_are_split_into_parts_one_world_after_the_other(workers):
+    axes = {"model": ["perfect-memory", "random"], "seed": range(3), "start_offset": np.linspace(-1, 1, 45).tolist()}
+    runs = {str(k): run for k, run in enumerate(Sweep.over("", ALONE, axes).experiments)}
+    parts = side_by_side(runs, workers)
+    assert sorted(key for part in parts for key in part) == sorted(runs)
+    assert all(len({training_key(runs[key]) for key in part}) == 1 for part in parts)
+    assert max(map(len, parts)) <= MAX_TOGETHER
+    worlds = [runs[part[0]].seed for part in parts]
+    assert worlds == sorted(worlds)
+    few = side_by_side(dict(list(runs.items())[:20]), workers)
+    assert len(few) >= workers  # nobody is idle
 
 
 # Sweep files
@@ -478,7 +551,7 @@ def scheduler(workers: int) -> Iterator[tuple[str, subprocess.Popen]]:
 def test_a_killed_worker_loses_nothing_and_all_listen_on_this_machine_only(tmp_path):
     with running(written(tmp_path, MANY), tmp_path / "out") as process:
         below = psutil.Process(process.pid).children(recursive=True)
-        workers = [each for each in below if any("spawn_main" in word for word in each.cmdline())]
+        workers = [each for each in below if "tussock.navigation.sweeps.work" in " ".join(each.parent().cmdline())]
         listening = [
             c.laddr.ip
             for each in [psutil.Process(process.pid), *workers]

@@ -1,6 +1,6 @@
 """Entering familiarity models: those with a name by it, any other from Python."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,47 +11,54 @@ from ..experiment import MODEL_SUFFIX, Experiment
 from ..experiment_keys import key_of
 from ..models import model_spec
 from ..models.base import FamiliarityModel
+from ..sweeps.spec import Sweep
 from ..sweeps.store import Store
 from ..sweeps.sweep import run_sweep
-from ..sweeps.work import walk
+from ..sweeps.work import draw, learn, walk
 from .definition import BENCHMARK, ENCODING, Benchmark
 from .results import Result, check_free, result_of, write_result
 
 
 def enter_named(
-    name: str,
+    names: Sequence[str],
     out: Path,
     *,
     encoding: str = ENCODING,
     benchmark: Benchmark = BENCHMARK,
     workers: str | int | None = None,
     progress: Progress = no_progress,
-) -> tuple[Result, Path]:
-    """Enter a model by its spec.
+) -> list[tuple[Result, Path]]:
+    """Enter models by their specs.
 
     Args:
-        name: For example "mushroom-body inputs=10", or "package.module:Class".
-        out: Folder for the runs, which are kept as a sweep keeps them, and for the result, in `out`/results.
-        encoding: What the model gets of a view.
+        names: For example "mushroom-body inputs=10", or "package.module:Class".
+        out: Folder for the runs, which are kept as a sweep keeps them, and for the results, in `out`/results.
+        encoding: What the models get of a view.
         benchmark: What is asked.
         workers: See `run_sweep`.
         progress: Called with how many runs are finished, of how many.
 
     Returns:
-        The result and its file.
+        For each model the result and its file.
 
     Raises:
         InputError: Where there is a result of another version, or of another entry under the same name.
     """
-    entry = checked_entry(name)
-    sweep, chain = benchmark.sweep(entry, encoding), benchmark.chain(encoding)
-    check_free(out, benchmark, entry, chain)
-    run_sweep(sweep, out, workers=workers, progress=progress)
+    chain = benchmark.chain(encoding)
+    entries = list(dict.fromkeys(map(checked_entry, names)))
+    for entry in entries:
+        check_free(out, benchmark, entry, chain)
+    sweeps = {entry: benchmark.sweep(entry, encoding) for entry in entries}
+    runs = [run for sweep in sweeps.values() for run in sweep.experiments]
+    run_sweep(Sweep(benchmark.name, {"model": entries}, runs), out, workers=workers, progress=progress)
     with Store(out, read_only=True) as store:
         kept = store.rows()
-    rows = [kept[key_of(run)] for run in sweep.experiments]
-    result = result_of(benchmark, entry, chain, sweep.experiments, rows)
-    return result, write_result(result, out, benchmark)
+    results = []
+    for entry, sweep in sweeps.items():
+        rows = [kept[key_of(run)] for run in sweep.experiments]
+        result = result_of(benchmark, entry, chain, sweep.experiments, rows)
+        results.append((result, write_result(result, out, benchmark)))
+    return results
 
 
 def checked_entry(name: str) -> str:
@@ -74,7 +81,7 @@ def enter(
     benchmark: Benchmark = BENCHMARK,
     progress: Progress = no_progress,
 ) -> tuple[Result, Path]:
-    """Enter any familiarity model from Python. Runs follow one another in this process, on one thread of torch.
+    """Enter any familiarity model from Python. The runs of a world walk side by side in this process, on one thread of torch.
 
     Args:
         make: Gives a new, untrained model; called for each world with its seed.
@@ -95,14 +102,14 @@ def enter(
     chain = benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding):
-        world, route = runs[0].open_world_and_route()
-        with runs[0].open_renderer(world) as renderer:
-            trained = runs[0].train(renderer, route, model=make(runs[0].seed))
-            for run in runs:
-                walked = walk(run, trained)
+        drawn = draw(runs[0], runs[0].open_world_and_route())
+        with drawn.renderer:
+            for walked in walk(runs, learn(runs[0], drawn, make(runs[0].seed))):
+                if isinstance(walked, Exception):
+                    raise walked
                 times = {"seconds": walked.seconds, "learn_seconds": walked.learn_seconds}
                 results.append(walked.results | times | {"error": walked.refused})
-                done.append(run)
-                progress(len(done), len(benchmark))
+        done += runs
+        progress(len(done), len(benchmark))
     result = result_of(benchmark, name, chain, done, results)
     return result, write_result(result, out, benchmark)

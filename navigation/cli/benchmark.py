@@ -39,29 +39,25 @@ class BenchmarkCommand(WorkerOptions):
         return {"results": files, "table": leaderboard(read_results(self.out))}
 
     def _enter(self) -> list[Path]:
-        """Enter the models, one after the other; the file of each."""
+        """Enter the models; the file of each."""
+        workers = self.started_workers()
         from tussock.world.specs import split_list
 
         from ..benchmark.definition import BENCHMARK, QUICK
-        from ..benchmark.models import checked_entry, enter_named
+        from ..benchmark.models import enter_named
         from ..models import MODELS
 
         benchmark = QUICK if self.quick else BENCHMARK
         names = list(MODELS.builtin) if self.model == "all" else split_list(self.model or "")
-        files = []
-        for name in dict.fromkeys(map(checked_entry, names)):  # refuses invalid names before the work begins
-            message(f"{name}: {len(benchmark)} runs of {benchmark.name}")
-            with progress("walking", "runs", verbose=True) as report:
-                result, path = enter_named(
-                    name,
-                    self.out,
-                    encoding=self.encoding,
-                    benchmark=benchmark,
-                    workers=self.chosen_workers(),
-                    progress=report,
-                )
+        message(f"{len(names)} models, each {len(benchmark)} runs of {benchmark.name}")
+        with progress("walking", "runs", verbose=True) as report:
+            entered = enter_named(
+                names, self.out, encoding=self.encoding, benchmark=benchmark, workers=workers, progress=report
+            )
+        for result, _ in entered:
             errors = [run.error for run in result.runs if run.error is not None]
             if errors:
-                message(f"{name}: {len(errors)} of {len(benchmark)} runs could not be done; the first: {errors[0]}")
-            files.append(path)
-        return files
+                message(
+                    f"{result.entry}: {len(errors)} of {len(benchmark)} runs could not be done; the first: {errors[0]}"
+                )
+        return [path for _, path in entered]

@@ -65,6 +65,15 @@ class WorkerOptions(Command):
             raise SettingError("--workers are those on this machine; a scheduler has its own: give one of the two")
         return self.workers if self.scheduler is None else self.scheduler
 
+    def started_workers(self) -> str | int | None:
+        """`chosen_workers`; those on this machine begin to start, while this process reads and checks what there is to do."""
+        from ..sweeps.workers import prepare_workers
+
+        workers = self.chosen_workers()
+        if not isinstance(workers, str):
+            prepare_workers()
+        return workers
+
 
 @dataclass(kw_only=True)
 class MeshOptions(Command):

@@ -48,15 +48,14 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         protocol = self.protocol()
         out = self.out or Path(protocol.name)
         self.check()
+        workers = self.started_workers()
         sweep = self.sweep(protocol)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
             command = self.command(out)
-            return replicate(
-                protocol, sweep, out, about=about, command=command, workers=self.chosen_workers(), progress=report
-            )
+            return replicate(protocol, sweep, out, about=about, command=command, workers=workers, progress=report)
 
     def protocol(self) -> "Protocol":
         """The protocol of this command. Raises SettingError for something else of that name."""

@@ -32,7 +32,7 @@ class SweepCommand(WorkerOptions):
         record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
         if record is None:
             raise SettingError(f"--record {self.record!r}: give worst:5, or another number")
-        workers = self.chosen_workers()
+        workers = self.started_workers()
         import_used(self.use)
         sweep = read_sweep(self.sweep)
 

@@ -2,14 +2,19 @@
 
 import json
 import logging
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from distributed import CancelledError, Client, LocalCluster, as_completed
+import dask.config
+import numpy as np
+from dask.base import tokenize
+from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
@@ -17,23 +22,27 @@ from tussock.world.errors import FileError, InputError, MissingDependencyError, 
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
-from ..experiment_keys import key_of, route_key, training_key
+from ..experiment_keys import key_of, route_key, training_key, views_key
 from ..experiment_settings import TYPES, run_command, settings_of
 from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
 from .store import Finished, Store, table_of, write_table
-from .work import Walked, learn, walk
+from .work import Walked, draw, learn, walk
+from .workers import METHOD, WORK, prepare_workers
 
 log = logging.getLogger(__name__)
 
+MAX_TOGETHER = 16  # runs: more gain little, and are kept later
+PARTS = 2  # groups of runs for each worker, where there are few runs
+QUEUED = 4  # groups that each worker has before it; more would only fill the scheduler's memory
 WORST = "worst"  # folder of the recordings
 SECONDS = 10.0  # to wait for a scheduler
 LOCAL: dict[str, Any] = {  # options of the workers on this machine, which nobody else can reach
     "threads_per_worker": 1,
     "memory_limit": None,
     "silence_logs": logging.CRITICAL,
-    "preload": [work.__name__],
+    "preload": [WORK],
     "host": "127.0.0.1",
     **dict.fromkeys(("dashboard_address", "worker_dashboard_address"), "127.0.0.1:0"),
 }
@@ -124,28 +133,68 @@ def _run(
 
 def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[tuple[str, Walked | BaseException]]]:
     """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
-    futures = {}
-    for key, experiment in missing.items():
-        path = client.submit(Experiment.open_world_and_route, experiment, key=route_key(experiment))
-        trained = client.submit(learn, experiment, path, key=training_key(experiment))
-        futures[client.submit(walk, experiment, trained, key=f"run-{key}")] = key
-    path = trained = None  # so that workers forget worlds and models when the last run that needs them is done
-    waiting = as_completed(futures, loop=client.loop, raise_errors=False)
-    left = len(futures)
-    while left:
+    waiting, tasks = as_completed(loop=client.loop, raise_errors=False), _tasks(client, missing)
+    futures: dict[Future, list[str]] = {}
+    gone: Exception | None = None
+    while gone is None:
         results = []
-        for future in waiting.next_batch(block=True):
-            try:
-                error = future.exception()
-                results.append((futures.pop(future), future.result() if error is None else error))
-            except (CancelledError, CommClosedError) as gone:
-                yield results
-                raise MissingDependencyError(
-                    "the scheduler is gone; all runs that were finished are kept: give the same command again"
-                ) from gone
-            future.release()
-        left -= len(results)
+        try:
+            for future, keys in islice(tasks, max(0, QUEUED * _workers(client) - len(futures))):
+                futures[future] = keys
+                waiting.add(future)
+            if not futures:
+                return
+            for future in waiting.next_batch(block=True):
+                error, keys = future.exception(), futures[future]
+                results += zip(keys, [error] * len(keys) if error is not None else future.result(), strict=True)
+                del futures[future]
+                future.release()
+        except (CancelledError, CommClosedError, OSError) as lost:
+            gone = lost
         yield results
+    raise MissingDependencyError(
+        "the scheduler is gone; all runs that were finished are kept: give the same command again"
+    ) from gone
+
+
+def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Future, list[str]]]:
+    """Submit walks side by side, and what they need, as they are asked for; with the keys of their runs.
+
+    Workers forget a world, views and a model when the last walk that needs them is done: this holds on to those of the last one only.
+    """
+    needs: dict[str, Future] = {}
+    for number, keys in enumerate(side_by_side(missing, _workers(client))):
+        runs = [missing[key] for key in keys]
+        first, earlier, given = runs[0], needs, []
+        needs = {}
+        options = {"priority": -number}  # worlds are finished one after the other
+        steps = {route_key: Experiment.open_world_and_route, views_key: draw, training_key: learn}
+        for key_of_step, step in steps.items():
+            key = key_of_step(first)
+            needs[key] = earlier.get(key) or client.submit(step, first, *given, key=key, **options)
+            given = [needs[key]]
+        yield client.submit(walk, runs, *given, key=f"walks-{tokenize(*keys)}", **options), keys
+
+
+def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
+    """Which runs walk together, as keys: runs of one trained model, so many that all workers are busy. One world after the other."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    first: dict[str, int] = {}  # when a world, views and a model are first needed
+    for key, run in runs.items():
+        names = route_key(run), views_key(run), training_key(run)
+        groups.setdefault(names, []).append(key)
+        for name in names:
+            first.setdefault(name, len(first))
+    size = min(MAX_TOGETHER, math.ceil(len(runs) / (PARTS * workers)))
+    parts = []
+    for _, group in sorted(groups.items(), key=lambda item: [first[name] for name in item[0]]):
+        parts += [part.tolist() for part in np.array_split(group, max(1, round(len(group) / size)))]
+    return parts
+
+
+def _workers(client: Client) -> int:
+    """How many tasks a cluster works on at once, at least 1; workers may join and leave."""
+    return max(1, sum(client.nthreads().values()))
 
 
 @contextmanager
@@ -155,6 +204,8 @@ def cluster(workers: str | int | None) -> Iterator[Client]:
         if isinstance(workers, str):
             scheduler = workers
         else:
+            prepare_workers()
+            stack.enter_context(dask.config.set({"distributed.worker.multiprocessing-method": METHOD}))
             local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)
             scheduler = stack.enter_context(local).scheduler_address
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are reported in one line, below

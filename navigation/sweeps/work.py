@@ -1,21 +1,45 @@
-"""The parts of a run as the workers of a sweep do them: open the world, learn, walk."""
+"""The parts of runs as the workers of a sweep do them: open the world, draw the training views, learn, walk."""
 
 import signal
 import time
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from distributed import WorkerPlugin
 
-from tussock.world.errors import InputError
+from tussock.render.renderer import Renderer
+from tussock.world.errors import InputError, first_line
 from tussock.world.geometry import Route
 from tussock.world.scene import World
+from tussock.world.specs import Spec
 
-from ..experiment import Experiment, TrainedNavigator
+from ..experiment import Experiment, TrainedNavigator, steps_of
 from ..failures import Cause
 from ..models.base import memory_bytes
 from ..registry import registry
+from ..threads import threads
 from ..trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..training import TrainingViews
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """What is ready when models begin to learn, for all that learn the same views.
+
+    Attributes:
+        renderer: Of the world.
+        route: Through it.
+        views: The training views; None where models come from files.
+        seconds: That drawing them took.
+    """
+
+    renderer: Renderer
+    route: Route
+    views: "TrainingViews | None"
+    seconds: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +50,8 @@ class Walked:
         refused: Why the walk has no valid start, where it has none; then there are no results, and never will be.
         results: By name.
         steps: The trajectory as CSV.
-        seconds: Of the walk.
-        learn_seconds: Of the learning before it.
+        seconds: Of the walk; of walks side by side, each has a share by its steps.
+        learn_seconds: Of the learning before it, as if it had been for this run alone.
     """
 
     refused: str | None = None
@@ -56,29 +80,69 @@ def dask_setup(worker: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def learn(experiment: Experiment, path: tuple[World, Route]) -> TrainedNavigator:
-    """What the navigator of an experiment learns before the walk."""
-    world, route = path
-    return experiment.train(experiment.open_renderer(world), route)
+def draw(experiment: Experiment, path: tuple[World, Route]) -> Drawn:
+    """The views that an experiment learns."""
+    began, (world, route) = time.perf_counter(), path
+    renderer = experiment.open_renderer(world)
+    with threads(experiment.threads):
+        views = experiment.training_views(renderer, route) if isinstance(experiment.model, Spec) else None
+    return Drawn(renderer=renderer, route=route, views=views, seconds=time.perf_counter() - began)
 
 
-def walk(experiment: Experiment, trained: TrainedNavigator) -> Walked:
-    """Walk as an experiment says."""
-    began, trajectory = time.perf_counter(), Trajectory()
+def learn(experiment: Experiment, drawn: Drawn, model: Any = None) -> TrainedNavigator:
+    """What the navigator of an experiment learns before the walk; see `Experiment.train` for the model."""
+    trained = experiment.train(drawn.renderer, drawn.route, model=model, views=drawn.views)
+    return replace(trained, seconds=drawn.seconds + trained.seconds)
+
+
+def walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[Walked | Exception]:
+    """Walk side by side, as experiments that have learned the same say; the results of each run, or its error."""
     try:
-        for step, diagnosis in experiment.steps(trained):
-            trajectory.add(step, diagnosis)
+        return _walk(experiments, trained)
+    except Exception as error:
+        if len(experiments) > 1:  # one of them is in the way of the others
+            return [result for each in experiments for result in walk([each], trained)]
+        return [error if isinstance(error, InputError) else RuntimeError(first_line(error))]
+
+
+def _walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[Walked | Exception]:
+    began = time.perf_counter()
+    refused = {k: refusal for k, each in enumerate(experiments) if (refusal := _refusal(each, trained))}
+    walking = [k for k in range(len(experiments)) if k not in refused]
+    trajectories = [Trajectory() for _ in experiments]
+    for steps in steps_of([experiments[k] for k in walking], trained) if walking else ():
+        for k, step in zip(walking, steps, strict=True):
+            if step is not None:
+                trajectories[k].add(*step)
+    per_step = (time.perf_counter() - began) / max(1, sum(map(len, trajectories)))
+    return [
+        Walked(
+            refused=refused.get(k),
+            results={} if k in refused else _results(trajectory, trained),
+            steps="" if k in refused else trajectory.to_csv(),
+            seconds=per_step * len(trajectory),
+            learn_seconds=trained.seconds,
+        )
+        for k, trajectory in enumerate(trajectories)
+    ]
+
+
+def _refusal(experiment: Experiment, trained: TrainedNavigator) -> str | None:
+    """Why a walk cannot start; None where it can."""
+    try:
+        experiment.walk(trained.renderer, trained.route)
     except InputError as error:
-        if len(trajectory):
-            raise
-        return Walked(refused=str(error), results={}, steps="", seconds=0.0, learn_seconds=trained.seconds)
+        return str(error)
+    return None
+
+
+def _results(trajectory: Trajectory, trained: TrainedNavigator) -> dict[str, Any]:
+    """The results of a walk, by name."""
     summary = trajectory.summary()
     causes = summary.pop("causes")
-    results = summary | {
+    return summary | {
         "n_views": None if trained.poses is None else len(trained.poses),
         "route_m": trained.route.length,
         "memory_bytes": None if trained.model is None else memory_bytes(trained.model.model),
         **{f"{cause.replace(' ', '_')}_steps": causes.get(cause, 0) for cause in Cause},
     }
-    seconds = time.perf_counter() - began
-    return Walked(results=results, steps=trajectory.to_csv(), seconds=seconds, learn_seconds=trained.seconds)

@@ -1,0 +1,28 @@
+"""Processes that do the runs of a sweep on this machine, started quickly. Importing this module is light."""
+
+import multiprocessing
+import os
+import sys
+from multiprocessing import forkserver
+
+METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # how these processes begin
+WORK = "tussock.navigation.sweeps.work"  # what they import
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+
+def prepare_workers() -> None:
+    """Begin to import what workers need, in a process of its own that they are forked from later: once for all of them.
+
+    Call it early: the imports take seconds, and go on while this process does other things.
+    """
+    if METHOD != "forkserver":
+        return
+    multiprocessing.get_context(METHOD).set_forkserver_preload([WORK])
+    before = dict(os.environ)
+    os.environ.update(ONE_THREAD)  # as Dask has it: each worker has one core
+    try:
+        forkserver.ensure_running()
+    finally:
+        for name in ONE_THREAD:
+            os.environ.pop(name)
+        os.environ.update(before)
