@@ -225,7 +225,8 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
         result = Result(**rest, runs=lines, times=times)
         scores = json.loads(json.dumps(result.scores()))
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError) as error:
-        raise FileError(f"{path} is not a result of tussock benchmark ({error!r}); make it again") from error
+        problem = str(error) if isinstance(error, InputError) else repr(error)
+        raise FileError(f"{path} is not a result of tussock benchmark ({problem}); make it again") from error
     if any(scores[name] != content.get(name) for name in scores):
         raise FileError(f"{path}: its totals do not follow from its runs; make it again")
     if (benchmark := known.get(result.benchmark)) is not None:
