@@ -1,12 +1,16 @@
 """How much of what an eye sees is very close to it."""
 
+from functools import lru_cache
+
 import numpy as np
+from jaxtyping import Float
 
 from tussock.world.geometry import Pose, column_azimuths
 from tussock.world.scene import World
 
 from .eye import Eye
 from .poses import poses_of_eye
+from .triangle_tree import tree_of
 
 RAY_SPACING = np.radians(5.0)  # rad
 
@@ -27,17 +31,15 @@ def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float
     Returns:
         The share, 0 to 1.
     """
-    rows = max(1, round((eye.top - eye.bottom) / RAY_SPACING))
-    elevations = Eye(height=rows, top=eye.top, bottom=eye.bottom).elevations()[:, None]
-    azimuths = column_azimuths(round(2 * np.pi / RAY_SPACING))
-    up = np.broadcast_to(np.sin(elevations), (rows, len(azimuths)))
-    rays = np.stack([np.cos(elevations) * np.cos(azimuths), np.cos(elevations) * np.sin(azimuths), up]).reshape(3, -1).T
     x, y, _, z = poses_of_eye(world, eye, [pose])[0]
     position = np.array([x, y, z])
-    close = (world.triangles.min(axis=1) < position + distance) & (world.triangles.max(axis=1) > position - distance)
-    close = close.all(axis=1)
+    close = tree_of(world).within(position - distance, position + distance)
+    close = close[close < len(world.triangles)]  # the world's own ground is after its triangles
     if world.terrain is not None:
-        close &= ~world.terrain.is_ground[: len(close)]  # the world's own ground is after its triangles
+        close = close[~world.terrain.is_ground[close]]
+    if len(close) == 0:  # as at most poses
+        return 0.0
+    rays, rows, azimuths = _rays(eye.top, eye.bottom)
     a, b, c = (world.triangles[close].astype(float) - position).transpose(1, 0, 2)
     volume = (a * np.cross(b, c)).sum(axis=1)
     visible = volume != 0 if world.double_sided else volume < 0
@@ -53,3 +55,14 @@ def covered_within(world: World, eye: Eye, pose: Pose, distance: float) -> float
         seen = eye.visible()[row[:, None], column].ravel()
         covered = covered[seen] if seen.any() else covered
     return float(covered.mean())
+
+
+@lru_cache(maxsize=8)
+def _rays(top: float, bottom: float) -> tuple[Float[np.ndarray, "rays 3"], int, Float[np.ndarray, " columns"]]:
+    """Unit vectors of the rays, row by row, between two elevations (rad); the number of rows; and the azimuths of the columns (rad)."""
+    rows = max(1, round((top - bottom) / RAY_SPACING))
+    elevations = Eye(height=rows, top=top, bottom=bottom).elevations()[:, None]
+    azimuths = column_azimuths(round(2 * np.pi / RAY_SPACING))
+    up = np.broadcast_to(np.sin(elevations), (rows, len(azimuths)))
+    rays = np.stack([np.cos(elevations) * np.cos(azimuths), np.cos(elevations) * np.sin(azimuths), up]).reshape(3, -1).T
+    return rays, rows, azimuths

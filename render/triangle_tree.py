@@ -1,9 +1,16 @@
 """The triangles of a world, sorted in space under a tree of boxes, so that a renderer can leave out many of them at once."""
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float, Float32, Int64, UInt64
+
+from tussock.world.scene import World
+
+from .scanline_kernels import LEAF
+
+COARSE = 256  # boxes from which a search begins: to test all of them takes no longer than one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +48,33 @@ class TriangleTree:
             leaves //= 2
             boxes[leaves : 2 * leaves] = np.hstack([below[:, :, :3].min(axis=1), below[:, :, 3:].max(axis=1)])
         return cls(leaf=leaf, order=order, corners=corners, boxes=boxes)
+
+    def within(self, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Int64[np.ndarray, " k"]:
+        """Index in the world, ascending, of the triangles whose bounding boxes overlap the inside of a box from `low` to `high` (m)."""
+        leaves = len(self.boxes) // 2
+        coarse = min(leaves, COARSE)
+        found = np.arange(coarse, 2 * coarse)
+        while True:
+            boxes = self.boxes[found]
+            found = found[((boxes[:, :3] < high) & (boxes[:, 3:] > low)).all(axis=1)]
+            if len(found) == 0 or found[0] >= leaves:
+                break
+            found = np.concatenate([2 * found, 2 * found + 1])
+        places = ((found - leaves)[:, None] * self.leaf + np.arange(self.leaf)).ravel()
+        places = places[places < len(self.order)]
+        corners = self.corners[:, :, places]
+        close = (corners.min(axis=1).T < high) & (corners.max(axis=1).T > low)
+        return np.sort(self.order[places[close.all(axis=1)]])
+
+
+_trees: WeakKeyDictionary[World, TriangleTree] = WeakKeyDictionary()
+
+
+def tree_of(world: World) -> TriangleTree:
+    """The tree of the surfaces of a world. It is made when it is first needed, and kept as long as the world."""
+    if world not in _trees:
+        _trees[world] = TriangleTree.of(world.surfaces()[0], LEAF)
+    return _trees[world]
 
 
 def _z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:
