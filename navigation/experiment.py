@@ -182,12 +182,12 @@ class Experiment(Surroundings):
                 loaded = load_model(self.model, device=self.device)
                 self.check_matches(loaded)
                 navigator = self.navigator.make(model=loaded.model)
-                poses = loaded.poses
+                images, poses = None, loaded.poses
             else:
                 navigator = self.navigator.make(model=self.make_model() if model is None else model)
                 wanted = self.training_poses(renderer.world, route)
-                views, poses = training_views(self.encoding, renderer, wanted, progress)
-                navigator.learn(views)
+                images, poses = training_views(self.encoding, renderer, wanted, progress)
+                navigator.learn(images)
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):
@@ -198,6 +198,7 @@ class Experiment(Surroundings):
             navigator=navigator,
             model=trained,
             poses=poses,
+            views=images,
             seconds=time.perf_counter() - began,
         )
 
@@ -243,7 +244,8 @@ class Experiment(Surroundings):
         with threads(self.threads):
             for (step,) in self.walk(trained.renderer, trained.route).steps(trained.navigator):
                 assert step is not None
-                yield step, trained.diagnostics.examine(step)
+                (diagnosis,) = trained.diagnostics.examine([step])
+                yield step, diagnosis
 
     @contextmanager
     def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:

@@ -23,6 +23,7 @@ class TrainedNavigator:
         navigator: What steers.
         model: Its familiarity model with what it was trained on; None where the navigator has none.
         poses: (n, 3) Where the views were learned; None where that is not known.
+        views: (n, h, w) The encoded views that were learned; None where they are not at hand.
         seconds: That learning took.
     """
 
@@ -31,6 +32,7 @@ class TrainedNavigator:
     navigator: "Navigator"
     model: "TrainedModel | None"
     poses: Any
+    views: Any
     seconds: float
 
     @cached_property
@@ -38,4 +40,4 @@ class TrainedNavigator:
         """What finds out why steps are poor."""
         from .failures import Diagnostics
 
-        return Diagnostics(self.renderer, self.model, self.route)
+        return Diagnostics(self.renderer, self.model, self.route, self.views)

@@ -63,8 +63,8 @@ class TriangleTree:
         places = ((found - leaves)[:, None] * self.leaf + np.arange(self.leaf)).ravel()
         places = places[places < len(self.order)]
         corners = self.corners[:, :, places]
-        close = (corners.min(axis=1).T < high) & (corners.max(axis=1).T > low)
-        return np.sort(self.order[places[close.all(axis=1)]])
+        close = (corners.min(axis=1) < high[:, None]) & (corners.max(axis=1) > low[:, None])
+        return np.sort(self.order[places[close.all(axis=0)]])
 
 
 _trees: WeakKeyDictionary[World, TriangleTree] = WeakKeyDictionary()

@@ -152,7 +152,7 @@ def first_step(case: Case, model: str = "perfect-memory", mirror: bool = False) 
         route = Route(seen(case.route.poses))
         agent = Agent(renderer=renderer, trained=trained, route=route, scan_width=2 * np.pi)
         step = next(agent.walk(Pose(*seen(np.array(case.start)).tolist())))
-        return step, Diagnostics(renderer, trained, route).examine(step)
+        return step, Diagnostics(renderer, trained, route).examine([step])[0]
 
 
 class WithoutMatch:
@@ -185,7 +185,7 @@ def test_noise_does_not_change_what_was_recognised():
                 stopping=StoppingRules(max_steps=30),
             )
             diagnostics = Diagnostics(renderer, trained, route)
-            diagnoses.append([diagnostics.examine(step) for step in agent.walk(agent.start())])
+            diagnoses.append([diagnostics.examine([step])[0] for step in agent.walk(agent.start())])
     assert diagnoses[0] == diagnoses[1]
     assert sum(each is not None for each in diagnoses[0]) > 5
 
@@ -250,7 +250,7 @@ def test_a_good_step_has_no_diagnosis():
             agent = Agent(renderer=renderer, trained=trained, route=route, scan_width=2 * np.pi)
             step = next(agent.walk(case.start))
             assert abs(step.error) > POOR
-            assert (Diagnostics(renderer, trained, route).examine(step) is None) == good
+            assert (Diagnostics(renderer, trained, route).examine([step]) == [None]) == good
 
 
 def test_without_the_poses_of_views_the_rest_is_measured():
@@ -259,7 +259,7 @@ def test_without_the_poses_of_views_the_rest_is_measured():
     with open_renderer(rooms(), EYE, "cpu") as renderer:
         model = train(make_model("perfect-memory"), GREY, renderer, case.learned).model
         trained = TrainedModel(model=model, encoding=GREY, eye=EYE, poses=None)
-        diagnosis = Diagnostics(renderer, trained, case.route).examine(step)
+        diagnosis = Diagnostics(renderer, trained, case.route).examine([step])[0]
     assert diagnosis is not None
     assert (diagnosis.nearest, diagnosis.recognised) == (None, None)
     assert diagnosis.cause == Cause.UNEXPLAINED
@@ -352,7 +352,7 @@ def walked(start: Pose, *, columns: int = 0, noise: float = 0.0, **stopping) -> 
         diagnostics = Diagnostics(renderer, trained, route)
         for step in agent.walk(start):
             steps.append(step)
-            trajectory.add(step, diagnostics.examine(step))
+            trajectory.add(step, diagnostics.examine([step])[0])
     return steps, trajectory
 
 

@@ -291,10 +291,10 @@ TINY = {"world": "tiny", "seed": 3, "route_length": 1.0, "eye": Eye(width=60, he
 def test_failures_are_diagnosed_behind_a_mask():
     experiment = Experiment(**TINY, model="infomax", encoding="edges", start_offset=0.3)
     with experiment.opened() as trained:
-        examined = [trained.diagnostics.examine(step) for step, _ in experiment.steps(trained)]
+        examined = [trained.diagnostics.examine([step])[0] for step, _ in experiment.steps(trained)]
         step, _ = next(experiment.steps(trained))
         failed = dataclasses.replace(step, failure=StopReason.LOST)
-        diagnosis = trained.diagnostics.examine(failed)
+        diagnosis = trained.diagnostics.examine([failed])[0]
     assert examined
     assert diagnosis.recognised is not None
     assert diagnosis.nearest is not None
