@@ -242,10 +242,10 @@ class Experiment(Surroundings):
         from .threads import threads
 
         with threads(self.threads):
-            for (step,) in self.walk(trained.renderer, trained.route).steps(trained.navigator):
-                assert step is not None
-                (diagnosis,) = trained.diagnostics.examine([step])
-                yield step, diagnosis
+            walk = self.walk(trained.renderer, trained.route).steps(trained.navigator)
+            for (examined,) in trained.diagnostics.along(walk):
+                assert examined is not None
+                yield examined
 
     @contextmanager
     def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:

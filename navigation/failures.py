@@ -1,7 +1,7 @@
 """Why a walk failed: what is measured at its poor and failed steps, and the cause that follows (docs/failures.md)."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -44,6 +44,7 @@ FAR = 2 * CATCHMENT  # m; catchments whose centres are farther apart do not touc
 REVERSE = np.pi - POOR  # a heading more than this off the route's leads back along it
 CHORD = 0.3  # m; how much the route turns is measured from so far before to so far after
 CORNER_ANGLE = POOR  # where a route turns more than this, a view learned a little before or after gives a poor heading
+TOGETHER = 16  # steps that are examined together
 RECOVERY = 0.5  # m; an agent that gets this much farther along the route without a poor step is out of trouble
 
 
@@ -147,6 +148,36 @@ class Diagnostics:
             )
         return diagnoses
 
+    def along(self, walk: Iterator[list[Step | None]]) -> Iterator[list[tuple[Step, Diagnosis | None] | None]]:
+        """A walk with diagnoses: each time, a list with the step of each agent and what is measured there, or None if its walk has ended.
+
+        The walk is up to TOGETHER looks ahead, because what is measured at many steps together takes a fraction of the time.
+
+        Args:
+            walk: The steps of agents side by side, as `Walk.steps` gives them.
+        """
+        ended = False
+        while not ended:
+            moments: list[list[Step | None]] = []
+            try:
+                for steps in walk:
+                    moments.append(steps)
+                    if sum(map(len, moments)) >= TOGETHER:
+                        break
+                else:
+                    ended = True
+            except (Exception, KeyboardInterrupt):  # what was walked before is not lost
+                yield from self._examined(moments)
+                raise
+            yield from self._examined(moments)
+
+    def _examined(self, moments: list[list[Step | None]]) -> Iterator[list[tuple[Step, Diagnosis | None] | None]]:
+        diagnoses = iter(self.examine([step for steps in moments for step in steps]))
+        for steps in moments:
+            yield [
+                None if step is None else (step, diagnosis) for step, diagnosis in zip(steps, diagnoses, strict=False)
+            ]
+
     def _poor(self, steps: Sequence[Step | None]) -> list[int]:
         """Which of some steps are poor or failed."""
         wrong = [
@@ -165,7 +196,7 @@ class Diagnostics:
         if isinstance(self._renderer, DatabaseViews):
             return [None] * len(steps)
         world, eye = self._renderer.world, self._renderer.eye
-        return [covered_within(world, eye, step.pose, OCCLUDER_DISTANCE) for step in steps]
+        return covered_within(world, eye, [step.pose for step in steps], OCCLUDER_DISTANCE).tolist()
 
     def _nearest(self, steps: Sequence[Step]) -> list[float] | list[None]:
         if self._learned is None:

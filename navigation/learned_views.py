@@ -9,6 +9,7 @@ from jaxtyping import Float32, Float64, Int64
 from tussock.world.geometry import columns_of_turn
 
 from .feature_mask import FeatureMask
+from .threads import one_torch_thread
 
 Images = Float32[torch.Tensor, "n h w"]
 
@@ -38,7 +39,9 @@ class LearnedViews:
         """
         turned = [view.roll(int(np.rint(columns_of_turn(turn, view.shape[1]))), dims=1) for view, turn in looks]
         seen = self._pixels(torch.stack(turned))
-        squared = self._squares - 2.0 * (seen @ self._rows.T).numpy().astype(np.float64)
+        with one_torch_thread():
+            products = seen @ self._rows.T
+        squared = self._squares - 2.0 * products.numpy().astype(np.float64)
         # A product of n pixels is wrong by n / 2 eps |v| |s| at most, and the difference of two distances by four times that.
         longest = np.sqrt(self._squares.max() * _squares(seen))
         tolerance = 2 * seen.shape[1] * np.finfo(np.float32).eps * longest

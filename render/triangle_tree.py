@@ -49,22 +49,32 @@ class TriangleTree:
             boxes[leaves : 2 * leaves] = np.hstack([below[:, :, :3].min(axis=1), below[:, :, 3:].max(axis=1)])
         return cls(leaf=leaf, order=order, corners=corners, boxes=boxes)
 
-    def within(self, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Int64[np.ndarray, " k"]:
-        """Index in the world, ascending, of the triangles whose bounding boxes overlap the inside of a box from `low` to `high` (m)."""
+    def within(
+        self, low: Float[np.ndarray, "k 3"], high: Float[np.ndarray, "k 3"]
+    ) -> tuple[Int64[np.ndarray, " pairs"], Int64[np.ndarray, " pairs"]]:
+        """The triangles whose bounding boxes overlap the insides of boxes from `low` to `high` (m).
+
+        Returns:
+            Pairs of a box and the index of a triangle in the world, ascending.
+        """
         leaves = len(self.boxes) // 2
         coarse = min(leaves, COARSE)
-        found = np.arange(coarse, 2 * coarse)
+        which, found = np.divmod(np.arange(len(low) * coarse), coarse)
+        found += coarse
         while True:
             boxes = self.boxes[found]
-            found = found[((boxes[:, :3] < high) & (boxes[:, 3:] > low)).all(axis=1)]
+            overlap = ((boxes[:, :3] < high[which]) & (boxes[:, 3:] > low[which])).all(axis=1)
+            which, found = which[overlap], found[overlap]
             if len(found) == 0 or found[0] >= leaves:
                 break
-            found = np.concatenate([2 * found, 2 * found + 1])
+            which, found = np.tile(which, 2), np.concatenate([2 * found, 2 * found + 1])
         places = ((found - leaves)[:, None] * self.leaf + np.arange(self.leaf)).ravel()
-        places = places[places < len(self.order)]
+        which, places = np.repeat(which, self.leaf)[places < len(self.order)], places[places < len(self.order)]
         corners = self.corners[:, :, places]
-        close = (corners.min(axis=1) < high[:, None]) & (corners.max(axis=1) > low[:, None])
-        return np.sort(self.order[places[close.all(axis=0)]])
+        close = ((corners.min(axis=1) < high[which].T) & (corners.max(axis=1) > low[which].T)).all(axis=0)
+        which, found = which[close], self.order[places[close]]
+        ascending = np.lexsort((found, which))
+        return which[ascending], found[ascending]
 
 
 _trees: WeakKeyDictionary[World, TriangleTree] = WeakKeyDictionary()

@@ -449,7 +449,7 @@ def test_the_share_covered_is_what_a_renderer_draws(seed, double_sided):
     with open_renderer(world, eye, "cpu") as renderer:
         for x, y, _ in random_poses(4, seed):
             drawn = renderer.render([(x, y, 0.0)])[0, ..., 3] > 127
-            assert covered_within(world, eye, Pose(x, y, 0.0), within) == drawn.mean()
+            assert covered_within(world, eye, [Pose(x, y, 0.0)], within) == drawn.mean()
 
 
 @pytest.mark.parametrize("double_sided", [True, False])
@@ -458,18 +458,18 @@ def test_a_wall_covers_what_is_within_the_distance(double_sided):
     wall = np.array(quad((-3.0, 0.03), (3.0, 0.03), -1, 1))  # its front towards the south
     world = world_of(wall, np.zeros((2, 3)), double_sided=double_sided)
     share = 2 * np.arccos(0.03 / 0.05) / (2 * np.pi)
-    assert abs(covered_within(world, eye, Pose(0.0, 0.0, 1.0), 0.05) - share) <= 1 / 72
-    assert abs(covered_within(world, eye, Pose(0.0, 0.06, 1.0), 0.05) - share * double_sided) <= 1 / 72
-    assert covered_within(world, eye, Pose(0.0, -0.03, 1.0), 0.05) == 0
+    assert abs(covered_within(world, eye, [Pose(0.0, 0.0, 1.0)], 0.05) - share) <= 1 / 72
+    assert abs(covered_within(world, eye, [Pose(0.0, 0.06, 1.0)], 0.05) - share * double_sided) <= 1 / 72
+    assert covered_within(world, eye, [Pose(0.0, -0.03, 1.0)], 0.05) == 0
     # How the wall is cut into triangles does not matter.
     corners = [(x, 0.03) for x in np.linspace(-3, 3, 200)]
     cut = [each for a, b in pairwise(corners) for each in quad(a, b, -1, 1)]
     finer = world_of(np.array(cut), np.zeros((len(cut), 3)), double_sided=double_sided)
-    covered, again = (covered_within(each, eye, Pose(0.0, 0.0, 1.0), 0.05) for each in (world, finer))
+    covered, again = (covered_within(each, eye, [Pose(0.0, 0.0, 1.0)], 0.05) for each in (world, finer))
     assert covered == again
 
 
 def test_the_ground_does_not_occlude():
     world = world_of(np.empty((0, 3, 3)), np.empty((0, 3)))
     assert len(world.surfaces()[0])  # there is ground, nearer than that
-    assert covered_within(world, EYE, Pose(0.0, 0.0, 0.0), 1.0) == 0
+    assert covered_within(world, EYE, [Pose(0.0, 0.0, 0.0)], 1.0) == 0

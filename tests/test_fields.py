@@ -304,9 +304,9 @@ def test_what_is_close_behind_the_eye_does_not_cover_its_view():
     wall = np.array([[[-0.02, -9, -9], [-0.02, 9, -9], [-0.02, 0, 9]]])  # west of the eye
     world, field = world_of(wall, np.zeros((1, 3))), {"width": 72, "height": 30}
     east, west = Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, math.pi)
-    whole = covered_within(world, Eye(**field), east, 0.05)
-    assert covered_within(world, Eye(**field, field=math.pi), east, 0.05) == 0
-    assert covered_within(world, Eye(**field, field=math.pi), west, 0.05) == pytest.approx(2 * whole)
+    whole = covered_within(world, Eye(**field), [east], 0.05)
+    assert covered_within(world, Eye(**field, field=math.pi), [east], 0.05) == 0
+    assert covered_within(world, Eye(**field, field=math.pi), [west], 0.05) == pytest.approx(2 * whole)
 
 
 def test_a_recording_a_view_and_an_observation_show_what_is_visible(tmp_path, monkeypatch):
