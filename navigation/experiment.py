@@ -174,7 +174,7 @@ class Experiment(Surroundings):
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
-        from .training import training_views
+        from .training import shared_views, training_views
 
         began = time.perf_counter()
         with threads(self.threads):
@@ -198,7 +198,7 @@ class Experiment(Surroundings):
             navigator=navigator,
             model=trained,
             poses=poses,
-            views=images,
+            views=None if images is None else shared_views(model, images),
             seconds=time.perf_counter() - began,
         )
 

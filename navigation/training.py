@@ -15,7 +15,7 @@ from tussock.world.progress import Progress, no_progress
 
 from .encoding import Encoding
 from .feature_mask import seeing
-from .models.base import FamiliarityModel
+from .models.base import FamiliarityModel, Images
 from .models.files import TrainedModel
 
 log = logging.getLogger(__name__)
@@ -144,6 +144,13 @@ def training_views(
             f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})"
         )
     return torch.cat(images), np.concatenate(kept)
+
+
+def shared_views(model: object, views: Images) -> Images:
+    """Views that a model has learned: its own tensor, where it keeps all of them as they are, so that they are in memory once."""
+    kept = getattr(model, "snapshots", None)
+    same = isinstance(kept, torch.Tensor) and kept.device == views.device and torch.equal(kept, views)
+    return kept if same else views
 
 
 def train(
