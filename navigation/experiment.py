@@ -181,6 +181,7 @@ class Experiment(Surroundings):
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
+        from .training import shared_views
 
         began = time.perf_counter()
         with threads(self.threads):
@@ -192,9 +193,7 @@ class Experiment(Surroundings):
             else:
                 navigator = self.navigator.make(model=self.make_model() if model is None else model)
                 images, poses = views or self.training_views(renderer, route, progress)
-                navigator.learn(
-                    images.clone()
-                )  # others learn these views, too, and a model of the user's may change them
+                navigator.learn(images.clone())  # others learn them, too, and a model of the user's may change them
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):
@@ -205,7 +204,7 @@ class Experiment(Surroundings):
             navigator=navigator,
             model=trained,
             poses=poses,
-            views=images,
+            views=None if images is None else shared_views(model, images),
             seconds=time.perf_counter() - began,
         )
 
@@ -296,5 +295,5 @@ def steps_of(
     from .threads import threads
 
     with threads(experiments[0].threads):
-        for steps in walk_of(experiments, trained.renderer, trained.route).steps(trained.navigator):
-            yield [None if step is None else (step, trained.diagnostics.examine(step)) for step in steps]
+        walk = walk_of(experiments, trained.renderer, trained.route)
+        yield from trained.diagnostics.along(walk.steps(trained.navigator))

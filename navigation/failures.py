@@ -1,7 +1,7 @@
 """Why a walk failed: what is measured at its poor and failed steps, and the cause that follows (docs/failures.md)."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -12,12 +12,14 @@ from jaxtyping import Float
 from tussock.render.images.source import DatabaseViews
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
-from tussock.world.geometry import Pose, Route, columns_of_turn, wrap_angle
+from tussock.world.errors import SettingError
+from tussock.world.geometry import Route, wrap_angle
 
 from .encoding import Encoding
 from .evaluation import RECOVERED_DEG
+from .feature_mask import FeatureMask, is_partial
+from .learned_views import Images, LearnedViews
 from .models.files import TrainedModel
-from .models.perfect_memory import PerfectMemory
 from .training import AHEAD, training_views
 from .walk import Step
 
@@ -43,6 +45,7 @@ FAR = 2 * CATCHMENT  # m; catchments whose centres are farther apart do not touc
 REVERSE = np.pi - POOR  # a heading more than this off the route's leads back along it
 CHORD = 0.3  # m; how much the route turns is measured from so far before to so far after
 CORNER_ANGLE = POOR  # where a route turns more than this, a view learned a little before or after gives a poor heading
+TOGETHER = 16  # steps that are examined together
 RECOVERY = 0.5  # m; an agent that gets this much farther along the route without a poor step is out of trouble
 
 
@@ -97,7 +100,7 @@ class Diagnosis:
 class Diagnostics:
     """Measures why the steps of a walk are poor."""
 
-    def __init__(self, renderer: Renderer, trained: TrainedModel | None, route: Route):
+    def __init__(self, renderer: Renderer, trained: TrainedModel | None, route: Route, views: Images | None = None):
         """Prepare for walks along a route.
 
         Args:
@@ -105,67 +108,141 @@ class Diagnostics:
             trained: What the walk follows. Where it is None, or the poses of its views are unknown, nothing about learned views is
                 measured.
             route: The route that the walk is to follow.
+            views: (m, h, w) The encoded views that it learned at these poses; they are kept, not copied. None: they are drawn again when
+                they are first needed.
+
+        Raises:
+            SettingError: For a model that has learned nothing or through another eye, and for views that are not those at its poses.
         """
         if trained is not None:
             trained.check()
             trained.check_eye(renderer.eye)
-        self._renderer, self._route = renderer, route
+        self._renderer, self._route, self._views = renderer, route, views
         self._learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None
         if trained is not None and trained.poses is not None and trained.encoding is not None:
             self._learned = trained.encoding, trained.poses
+            if views is not None and len(views) != len(trained.poses):
+                raise SettingError(
+                    f"{len(trained.poses)} poses for {len(views)} views; give the views at these poses, or none"
+                )
 
-    def examine(self, step: Step) -> Diagnosis | None:
-        """What is measured at a poor or failed step; None for a good one, which costs nothing.
+    def examine(self, steps: Sequence[Step | None]) -> list[Diagnosis | None]:
+        """What is measured at the poor and failed steps of agents side by side; None for a good one, which costs nothing.
 
         A heading towards the route a little ahead is good too: it is the way back for an agent that is off the route.
+
+        Args:
+            steps: One for each agent; None for an agent whose walk has ended, which gives None. A walk alone is a list of one.
         """
-        if step.failure is None and (abs(step.error) <= POOR or abs(self._off_the_way_back(step)) <= POOR):
-            return None
-        return Diagnosis(
-            covered=self._covered(step.pose),
-            nearest=self._nearest(step.pose),
-            recognised=self._recognised(step),
-            error=step.error,
-            turning=float(self._route.turning(step.along, CHORD)[0]),
+        diagnoses: list[Diagnosis | None] = [None] * len(steps)
+        places = self._poor(steps)
+        poor = [step for place in places if (step := steps[place]) is not None]
+        if not poor:
+            return diagnoses
+        turning = self._route.turning([step.along for step in poor], CHORD).tolist()
+        measured = zip(
+            places, poor, self._covered(poor), self._nearest(poor), self._recognised(poor), turning, strict=True
         )
+        for place, step, covered, nearest, recognised, turns in measured:
+            diagnoses[place] = Diagnosis(
+                covered=covered, nearest=nearest, recognised=recognised, error=step.error, turning=turns
+            )
+        return diagnoses
 
-    def _off_the_way_back(self, step: Step) -> float:
-        """Angle between the chosen heading and the point of the route AHEAD of the nearest one (rad)."""
-        x, y, _ = self._route.at(step.along + AHEAD)[0]
-        return float(wrap_angle(step.pose.heading + step.turn - np.arctan2(y - step.pose.y, x - step.pose.x)))
+    def along(self, walk: Iterator[list[Step | None]]) -> Iterator[list[tuple[Step, Diagnosis | None] | None]]:
+        """A walk with diagnoses: each time, a list with the step of each agent and what is measured there, or None if its walk has ended.
 
-    def _covered(self, pose: Pose) -> float | None:
+        The walk is up to TOGETHER looks ahead, because what is measured at many steps together takes a fraction of the time.
+
+        Args:
+            walk: The steps of agents side by side, as `Walk.steps` gives them.
+        """
+        ended = False
+        while not ended:
+            moments: list[list[Step | None]] = []
+            try:
+                for steps in walk:
+                    moments.append(steps)
+                    if sum(map(len, moments)) >= TOGETHER:
+                        break
+                else:
+                    ended = True
+            except (Exception, KeyboardInterrupt):  # what was walked before is not lost
+                yield from self._examined(moments)
+                raise
+            yield from self._examined(moments)
+
+    def _examined(self, moments: list[list[Step | None]]) -> Iterator[list[tuple[Step, Diagnosis | None] | None]]:
+        diagnoses = iter(self.examine([step for steps in moments for step in steps]))
+        for steps in moments:
+            yield [
+                None if step is None else (step, diagnosis) for step, diagnosis in zip(steps, diagnoses, strict=False)
+            ]
+
+    def _poor(self, steps: Sequence[Step | None]) -> list[int]:
+        """Which of some steps are poor or failed."""
+        wrong = [
+            (k, step) for k, step in enumerate(steps) if step is not None and (step.failure or abs(step.error) > POOR)
+        ]
+        if all(step.failure for _, step in wrong):
+            return [k for k, _ in wrong]
+        ahead = self._route.at([step.along + AHEAD for _, step in wrong])
+        x, y, heading = np.array([step.pose for _, step in wrong]).T
+        turn = [step.turn for _, step in wrong]
+        off_the_way_back = wrap_angle(heading + turn - np.arctan2(ahead[:, 1] - y, ahead[:, 0] - x))
+        astray = (np.abs(off_the_way_back) > POOR).tolist()
+        return [k for (k, step), off in zip(wrong, astray, strict=True) if step.failure or off]
+
+    def _covered(self, steps: Sequence[Step]) -> list[float] | list[None]:
         if isinstance(self._renderer, DatabaseViews):
-            return None
-        return covered_within(self._renderer.world, self._renderer.eye, pose, OCCLUDER_DISTANCE)
+            return [None] * len(steps)
+        world, eye = self._renderer.world, self._renderer.eye
+        return covered_within(world, eye, [step.pose for step in steps], OCCLUDER_DISTANCE).tolist()
 
-    def _nearest(self, pose: Pose) -> float | None:
+    def _nearest(self, steps: Sequence[Step]) -> list[float] | list[None]:
         if self._learned is None:
-            return None
+            return [None] * len(steps)
         _, poses = self._learned
-        return float(np.hypot(*(poses[:, :2] - pose[:2]).T).min())
+        x, y, _ = np.array([step.pose for step in steps]).T[..., None]
+        return np.hypot(poses[:, 0] - x, poses[:, 1] - y).min(axis=1).tolist()
 
-    def _recognised(self, step: Step) -> float | None:
+    def _recognised(self, steps: Sequence[Step]) -> list[float | None]:
         if self._learned is None:
-            return None
-        (encoding, poses), match = self._learned, step.match
-        if match is None:  # the model keeps no views: take the learned view that looks most like this one
-            if step.view is None:
-                return None
+            return [None] * len(steps)
+        _, poses = self._learned
+        away: list[float | None] = [None] * len(steps)
+        unmatched = []  # the model keeps no views: take the learned view that looks most like what the agent saw
+        for k, step in enumerate(steps):
+            if step.match is not None:
+                away[k] = _distance(poses[step.match], step)
+            elif step.encoded is not None:
+                unmatched.append(k)
+        if unmatched and not is_partial(self._mask):  # images that are partly unknown are compared by their own means
             memory, poses = self._memory
-            known = self._renderer.known([step.pose]) if isinstance(self._renderer, DatabaseViews) else None
-            _, index = memory.match(encoding.for_eye(self._renderer.eye)(step.view[None], known))
-            width = index.shape[1]
-            match = int(index[0, int(np.rint(columns_of_turn(step.aim, width))) % width])
-        return float(np.hypot(*(poses[match, :2] - step.pose[:2])))
+            looks = [(steps[k].encoded, steps[k].aim) for k in unmatched]
+            for k, match in zip(unmatched, memory.nearest(looks), strict=True):
+                away[k] = _distance(poses[match], steps[k])
+        return away
 
     @cached_property
-    def _memory(self) -> tuple[PerfectMemory, Float[np.ndarray, "m 3"]]:
-        """A memory of all learned views, and their poses."""
+    def _memory(self) -> tuple[LearnedViews, Float[np.ndarray, "m 3"]]:
+        """All learned views, and their poses."""
         assert self._learned is not None
-        encoding, poses = self._learned
-        views, poses = training_views(encoding, self._renderer, poses)
-        return PerfectMemory().see(encoding.for_eye(self._renderer.eye).mask).fit(views), poses
+        (encoding, poses), views = self._learned, self._views
+        if views is None:
+            views, poses = training_views(encoding, self._renderer, poses)
+        return LearnedViews(views, self._mask), poses
+
+    @property
+    def _mask(self) -> FeatureMask | None:
+        """What a model sees of the views."""
+        assert self._learned is not None
+        return self._learned[0].for_eye(self._renderer.eye).mask
+
+
+def _distance(pose: Float[np.ndarray, "3"], step: Step) -> float:
+    """Distance from a pose to where an agent made a step (m)."""
+    return float(np.hypot(pose[0] - step.pose.x, pose[1] - step.pose.y))
 
 
 def walk_cause(along: Sequence[float], causes: Sequence[str], failed: Sequence[bool]) -> str | None:

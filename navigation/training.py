@@ -157,6 +157,14 @@ def _contrast(images: Images, mask: FeatureMask | None) -> Float32[torch.Tensor,
     return centred.square().nanmean(dim=1).sqrt().nan_to_num(0.0)  # 0 where nothing is known
 
 
+def shared_views(model: object, views: Images) -> Images:
+    """Views that a model has learned: its own tensor, where it keeps all of them as they are, so that they are in memory once."""
+    kept = getattr(model, "snapshots", None)
+    if isinstance(kept, torch.Tensor) and kept.device == views.device and torch.equal(kept, views):
+        return kept
+    return views
+
+
 def train(
     model: FamiliarityModel, encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"]
 ) -> TrainedModel:

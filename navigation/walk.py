@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float32, UInt8
 
 from tussock.render.images.source import DatabaseViews
@@ -22,7 +23,7 @@ from tussock.world.terrain import Terrain
 
 from .body import Body
 from .encoding import Encoding
-from .steering.navigator import Look, Motion, Navigator, check_motion
+from .steering.navigator import Images, Look, Motion, Navigator, check_motion
 from .stop_check import StopCheck
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread
@@ -46,6 +47,7 @@ class Step:
         pose: Where the agent stands and faces as it looks.
         height: Of the ground beneath it (m).
         view: (height, width, 4) What it sees, RGBA (RGB where it comes from images without alpha); None where it was not drawn.
+        encoded: (h, w) The feature image that the navigator gets of it; None likewise.
         familiarity: (w,) Of every rotation, turned left by 0, 1, .. columns; None where the navigator does not scan.
         scanned: (w,) Which of these rotations the navigator compared; None likewise.
         aim: Turn that the navigator decided on (rad, left positive).
@@ -65,6 +67,7 @@ class Step:
     pose: Pose
     height: float
     view: UInt8[np.ndarray, "height width channels"] | None
+    encoded: Float32[torch.Tensor, "h w"] | None
     familiarity: Float32[np.ndarray, " w"] | None
     scanned: Bool[np.ndarray, " w"] | None
     aim: float
@@ -124,7 +127,7 @@ class Walk:
         each = zip(range(len(starts)), starts, bodies, rules, generators, strict=True)
         self.agents = [Walker(self, *of_agent) for of_agent in each]
         self.reach = renderer.reach if isinstance(renderer, DatabaseViews) else np.inf
-        self._views: UInt8[np.ndarray, "n height width channels"] | None = None
+        self._seen: tuple[UInt8[np.ndarray, "n height width channels"], Images] | None = None  # views, and as encoded
         self._measure(self.agents)
         if off := [agent.pose for agent in self.agents if agent.reason is StopReason.OFF_GRID]:
             raise SettingError(
@@ -149,17 +152,19 @@ class Walk:
     def look(self) -> Look:
         """What the agents whose walk goes on perceive."""
         poses = np.array([agent.pose for agent in self.walking])
-        self._views = self.renderer.render(poses)
+        views = self.renderer.render(poses)
         known = self.renderer.known(poses) if isinstance(self.renderer, DatabaseViews) else None
-        return Look(views=self.encoding(self._views, known), compass=poses[:, 2])
+        self._seen = views, self.encoding(views, known)
+        return Look(views=self._seen[1], compass=poses[:, 2])
 
     def move(self, motion: Motion) -> list[Step | None]:
         """Let the agents whose walk goes on move, and measure where they come to; a row of the motion for each of them."""
         walking = self.walking
         steps: list[Step | None] = [None] * len(self.agents)
         for row, agent in enumerate(walking):
-            steps[agent.number] = agent.step(motion, row, None if self._views is None else self._views[row])
-        self._views = None
+            seen = (None, None) if self._seen is None else (self._seen[0][row], self._seen[1][row])
+            steps[agent.number] = agent.step(motion, row, *seen)
+        self._seen = None
         self._measure([agent for agent in walking if not agent.ended])
         return steps
 
@@ -225,7 +230,7 @@ class Walker:
         if self.reason is None and self.index >= self.step_limit:
             self.reason = StopReason.OUT_OF_STEPS
 
-    def step(self, motion: Motion, row: int, view: np.ndarray | None) -> Step:
+    def step(self, motion: Motion, row: int, view: np.ndarray | None, encoded: torch.Tensor | None) -> Step:
         """Do as a row of a motion says."""
         stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
         aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
@@ -237,6 +242,7 @@ class Walker:
             pose=pose,
             height=self.height,
             view=view,
+            encoded=encoded,
             familiarity=None if scan is None else scan.familiarity[row],
             scanned=None if scan is None else scan.window[row],
             aim=aim,

@@ -37,8 +37,8 @@ from .colour_kernels import PLAIN
 from .cores import core_count
 from .eye import Eye
 from .poses import Poses, Views, poses_of_eye
-from .scanline_kernels import LEAF, draw_views
-from .triangle_tree import TriangleTree
+from .scanline_kernels import draw_views
+from .triangle_tree import tree_of
 
 
 class Triangles(NamedTuple):
@@ -169,8 +169,8 @@ class ScanlineRenderer:
         if threads is not None and threads < 1:
             raise SettingError(f"the renderer got {threads} threads; give at least 1, or None for every core")
         self.world, self.eye = world, eye
-        triangles, rgb = world.surfaces()
-        tree = TriangleTree.of(triangles, LEAF)
+        _, rgb = world.surfaces()
+        tree = tree_of(world)
         labels = len(rgb) - tree.order  # of equally near triangles the first is seen
         triangles = Triangles(tree.corners, labels, tree.boxes, not world.double_sided)
         elevations = eye.elevations(eye.rays)

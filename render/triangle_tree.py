@@ -1,9 +1,16 @@
 """The triangles of a world, sorted in space under a tree of boxes, so that a renderer can leave out many of them at once."""
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float, Float32, Int64, UInt64
+
+from tussock.world.scene import World
+
+from .scanline_kernels import LEAF
+
+COARSE = 256  # boxes from which a search begins: to test all of them takes no longer than one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +48,43 @@ class TriangleTree:
             leaves //= 2
             boxes[leaves : 2 * leaves] = np.hstack([below[:, :, :3].min(axis=1), below[:, :, 3:].max(axis=1)])
         return cls(leaf=leaf, order=order, corners=corners, boxes=boxes)
+
+    def within(
+        self, low: Float[np.ndarray, "k 3"], high: Float[np.ndarray, "k 3"]
+    ) -> tuple[Int64[np.ndarray, " pairs"], Int64[np.ndarray, " pairs"]]:
+        """The triangles whose bounding boxes overlap the insides of boxes from `low` to `high` (m).
+
+        Returns:
+            Pairs of a box and the index of a triangle in the world, ascending.
+        """
+        leaves = len(self.boxes) // 2
+        coarse = min(leaves, COARSE)
+        which, found = np.divmod(np.arange(len(low) * coarse), coarse)
+        found += coarse
+        while True:
+            boxes = self.boxes[found]
+            overlap = ((boxes[:, :3] < high[which]) & (boxes[:, 3:] > low[which])).all(axis=1)
+            which, found = which[overlap], found[overlap]
+            if len(found) == 0 or found[0] >= leaves:
+                break
+            which, found = np.tile(which, 2), np.concatenate([2 * found, 2 * found + 1])
+        places = ((found - leaves)[:, None] * self.leaf + np.arange(self.leaf)).ravel()
+        which, places = np.repeat(which, self.leaf)[places < len(self.order)], places[places < len(self.order)]
+        corners = self.corners[:, :, places]
+        close = ((corners.min(axis=1) < high[which].T) & (corners.max(axis=1) > low[which].T)).all(axis=0)
+        which, found = which[close], self.order[places[close]]
+        ascending = np.lexsort((found, which))
+        return which[ascending], found[ascending]
+
+
+_trees: WeakKeyDictionary[World, TriangleTree] = WeakKeyDictionary()
+
+
+def tree_of(world: World) -> TriangleTree:
+    """The tree of the surfaces of a world. It is made when it is first needed, and kept as long as the world."""
+    if world not in _trees:
+        _trees[world] = TriangleTree.of(world.surfaces()[0], LEAF)
+    return _trees[world]
 
 
 def _z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:

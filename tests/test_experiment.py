@@ -484,6 +484,15 @@ def test_progress_is_reported_while_it_walks():
     assert reported == [(k, 3) for k in range(len(trajectory))]
 
 
+@pytest.mark.parametrize("model", ["perfect-memory", "visual-compass", "random"])
+def test_training_views_are_in_memory_once(model):
+    experiment = Experiment(world="tiny", route_length=1.0, eye=Eye(width=60, height=15), model=model)
+    with experiment.opened() as trained:
+        kept = getattr(trained.model.model, "snapshots", None)
+        assert (kept is not None and kept.data_ptr() == trained.views.data_ptr()) == (model == "perfect-memory")
+        assert len(trained.views) == len(trained.poses)
+
+
 def test_a_navigator_without_a_model_walks(tmp_path):
     """One from outside: nothing is measured about learned views."""
     experiment = experiment_of({"world": "tiny", "size": "60x12", "navigator": AHEAD, "max_steps": 60})

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import random_poses, random_world, world_of
@@ -17,16 +18,19 @@ from tussock.navigation.agent import Agent
 from tussock.navigation.body import Body
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.failures import CATCHMENT, FAR, POOR, Cause, Diagnosis, Diagnostics, walk_cause
+from tussock.navigation.feature_mask import FeatureMask
+from tussock.navigation.learned_views import LearnedViews
 from tussock.navigation.models import make_model
 from tussock.navigation.models.files import TrainedModel
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.stopping import StoppingRules, StopReason
-from tussock.navigation.training import train
+from tussock.navigation.training import train, training_views
 from tussock.navigation.trajectory import COLUMNS, Trajectory
 from tussock.navigation.walk import Step
 from tussock.render.eye import Eye
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import open_renderer
+from tussock.render.triangle_tree import tree_of
 from tussock.world.errors import InputError
 from tussock.world.geometry import Pose, Route
 
@@ -152,7 +156,7 @@ def first_step(case: Case, model: str = "perfect-memory", mirror: bool = False) 
         route = Route(seen(case.route.poses))
         agent = Agent(renderer=renderer, trained=trained, route=route, scan_width=2 * np.pi)
         step = next(agent.walk(Pose(*seen(np.array(case.start)).tolist())))
-        return step, Diagnostics(renderer, trained, route).examine(step)
+        return step, Diagnostics(renderer, trained, route).examine([step])[0]
 
 
 class WithoutMatch:
@@ -185,7 +189,7 @@ def test_noise_does_not_change_what_was_recognised():
                 stopping=StoppingRules(max_steps=30),
             )
             diagnostics = Diagnostics(renderer, trained, route)
-            diagnoses.append([diagnostics.examine(step) for step in agent.walk(agent.start())])
+            diagnoses.append([diagnostics.examine([step])[0] for step in agent.walk(agent.start())])
     assert diagnoses[0] == diagnoses[1]
     assert sum(each is not None for each in diagnoses[0]) > 5
 
@@ -250,7 +254,7 @@ def test_a_good_step_has_no_diagnosis():
             agent = Agent(renderer=renderer, trained=trained, route=route, scan_width=2 * np.pi)
             step = next(agent.walk(case.start))
             assert abs(step.error) > POOR
-            assert (Diagnostics(renderer, trained, route).examine(step) is None) == good
+            assert (Diagnostics(renderer, trained, route).examine([step]) == [None]) == good
 
 
 def test_without_the_poses_of_views_the_rest_is_measured():
@@ -259,7 +263,7 @@ def test_without_the_poses_of_views_the_rest_is_measured():
     with open_renderer(rooms(), EYE, "cpu") as renderer:
         model = train(make_model("perfect-memory"), GREY, renderer, case.learned).model
         trained = TrainedModel(model=model, encoding=GREY, eye=EYE, poses=None)
-        diagnosis = Diagnostics(renderer, trained, case.route).examine(step)
+        diagnosis = Diagnostics(renderer, trained, case.route).examine([step])[0]
     assert diagnosis is not None
     assert (diagnosis.nearest, diagnosis.recognised) == (None, None)
     assert diagnosis.cause == Cause.UNEXPLAINED
@@ -320,6 +324,82 @@ def test_the_documentation_has_the_thresholds():
     assert all(f"**{cause}**" in text for cause in Cause)
 
 
+def test_agents_are_examined_side_by_side_as_they_are_alone(monkeypatch):
+    """Also with the views that were learned, which then are not drawn again, and where a walk has ended."""
+    world, route = random_world(np.random.default_rng(3)), straight(0.0)
+    with open_renderer(world, EYE, "cpu") as renderer:
+        drawn, render = [], renderer.render
+        monkeypatch.setattr(renderer, "render", lambda poses: drawn.append(len(poses)) or render(poses))
+        views, poses = training_views(GREY, renderer, route.resampled(0.1).poses)
+        trained = TrainedModel(model=WithoutMatch().fit(views), encoding=GREY, eye=EYE, poses=poses)
+        rules = StoppingRules(max_steps=12, max_deviation=0.25)
+        agent = Agent(renderer=renderer, trained=trained, route=route, body=Body(heading_noise=2.0), stopping=rules)
+        walk = list(agent.walk_many([agent.start(offset) for offset in (0.3, 0.0, 0.05)]))
+        drawn.clear()
+        given = Diagnostics(renderer, trained, route, views)
+        together = [given.examine(steps) for steps in walk]
+        assert sum(drawn) == 0
+        alone = Diagnostics(renderer, trained, route)
+        assert together == [[alone.examine([step])[0] for step in steps] for steps in walk]
+        assert sum(drawn) == len(views)
+        along = [[each and each[1] for each in steps] for steps in given.along(iter(walk))]
+        assert along == together
+        with pytest.raises(InputError, match="views"):
+            Diagnostics(renderer, trained, route, views[1:])
+    assert any(None in steps for steps in walk)
+    assert len({each.recognised for steps in together for each in steps if each is not None}) > 3
+
+
+def test_a_walk_that_breaks_off_leaves_what_it_walked():
+    def broken():
+        yield [step]
+        raise InputError("broken")
+
+    case, _ = CASES["off"]
+    step, diagnosis = first_step(case)
+    with open_renderer(rooms(), EYE, "cpu") as renderer:
+        walk = Diagnostics(renderer, None, case.route).along(broken())
+        ((same, examined),) = next(walk)
+        with pytest.raises(InputError, match="broken"):
+            next(walk)
+    assert same is step
+    assert examined.error == diagnosis.error
+
+
+@pytest.mark.parametrize("mask", [None, "pixels", "normalised"])
+def test_the_nearest_learned_view_is_that_of_perfect_memory(mask):
+    random = torch.Generator().manual_seed(1)
+    views, looks = torch.randn(40, 5, 12, generator=random), torch.randn(30, 5, 12, generator=random)
+    if mask is not None:
+        mask = FeatureMask(torch.rand(5, 12, generator=random) < 0.6, normalised=mask == "normalised")
+    memory, learned = make_model("perfect-memory").see(mask).fit(views), LearnedViews(views, mask)
+    turns = (np.arange(30) - 15) * 2 * np.pi / 12
+    _, index = memory.match(looks)
+    assert learned.nearest(zip(looks, turns, strict=True)) == [int(index[k, (k - 15) % 12]) for k in range(30)]
+
+
+def test_of_equally_near_learned_views_it_is_the_first_whatever_else_is_compared():
+    random = torch.Generator().manual_seed(2)
+    views = torch.randn(5, 3, 8, generator=random).repeat(40, 1, 1) + 100
+    looks = [(view, 0.0) for view in views[:23] + 1e-3 * torch.randn(23, 3, 8, generator=random)]
+    learned = LearnedViews(views, None)
+    assert learned.nearest(looks) == [learned.nearest([look])[0] for look in looks] == [k % 5 for k in range(23)]
+
+
+@pytest.mark.parametrize("n", [0, 1, 31, 33, 9000])
+def test_the_tree_finds_the_triangles_in_a_box(n):
+    rng = np.random.default_rng(n)
+    corners = rng.uniform(0, 2, (n, 1, 3)) + rng.uniform(-0.1, 0.1, (n, 3, 3))
+    world = world_of(corners, np.zeros((n, 3)))
+    triangles = world.surfaces()[0]
+    middle = rng.uniform(-0.1, 2.1, (40, 3))
+    low, high = middle - rng.uniform(0, 0.2, (40, 1)), middle + 0.1
+    overlap = (triangles.min(axis=1) < high[:, None]) & (triangles.max(axis=1) > low[:, None])
+    which, found = tree_of(world).within(low, high)
+    assert list(zip(which, found, strict=True)) == list(zip(*np.nonzero(overlap.all(axis=2)), strict=True))
+    assert tree_of(world) is tree_of(world)
+
+
 class FixedTurn:
     """A model that keeps no views and always turns by the same number of columns."""
 
@@ -352,7 +432,7 @@ def walked(start: Pose, *, columns: int = 0, noise: float = 0.0, **stopping) -> 
         diagnostics = Diagnostics(renderer, trained, route)
         for step in agent.walk(start):
             steps.append(step)
-            trajectory.add(step, diagnostics.examine(step))
+            trajectory.add(step, diagnostics.examine([step])[0])
     return steps, trajectory
 
 
@@ -449,7 +529,7 @@ def test_the_share_covered_is_what_a_renderer_draws(seed, double_sided):
     with open_renderer(world, eye, "cpu") as renderer:
         for x, y, _ in random_poses(4, seed):
             drawn = renderer.render([(x, y, 0.0)])[0, ..., 3] > 127
-            assert covered_within(world, eye, Pose(x, y, 0.0), within) == drawn.mean()
+            assert covered_within(world, eye, [Pose(x, y, 0.0)], within) == drawn.mean()
 
 
 @pytest.mark.parametrize("double_sided", [True, False])
@@ -458,18 +538,18 @@ def test_a_wall_covers_what_is_within_the_distance(double_sided):
     wall = np.array(quad((-3.0, 0.03), (3.0, 0.03), -1, 1))  # its front towards the south
     world = world_of(wall, np.zeros((2, 3)), double_sided=double_sided)
     share = 2 * np.arccos(0.03 / 0.05) / (2 * np.pi)
-    assert abs(covered_within(world, eye, Pose(0.0, 0.0, 1.0), 0.05) - share) <= 1 / 72
-    assert abs(covered_within(world, eye, Pose(0.0, 0.06, 1.0), 0.05) - share * double_sided) <= 1 / 72
-    assert covered_within(world, eye, Pose(0.0, -0.03, 1.0), 0.05) == 0
+    assert abs(covered_within(world, eye, [Pose(0.0, 0.0, 1.0)], 0.05) - share) <= 1 / 72
+    assert abs(covered_within(world, eye, [Pose(0.0, 0.06, 1.0)], 0.05) - share * double_sided) <= 1 / 72
+    assert covered_within(world, eye, [Pose(0.0, -0.03, 1.0)], 0.05) == 0
     # How the wall is cut into triangles does not matter.
     corners = [(x, 0.03) for x in np.linspace(-3, 3, 200)]
     cut = [each for a, b in pairwise(corners) for each in quad(a, b, -1, 1)]
     finer = world_of(np.array(cut), np.zeros((len(cut), 3)), double_sided=double_sided)
-    covered, again = (covered_within(each, eye, Pose(0.0, 0.0, 1.0), 0.05) for each in (world, finer))
+    covered, again = (covered_within(each, eye, [Pose(0.0, 0.0, 1.0)], 0.05) for each in (world, finer))
     assert covered == again
 
 
 def test_the_ground_does_not_occlude():
     world = world_of(np.empty((0, 3, 3)), np.empty((0, 3)))
     assert len(world.surfaces()[0])  # there is ground, nearer than that
-    assert covered_within(world, EYE, Pose(0.0, 0.0, 0.0), 1.0) == 0
+    assert covered_within(world, EYE, [Pose(0.0, 0.0, 0.0)], 1.0) == 0

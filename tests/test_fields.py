@@ -291,10 +291,10 @@ TINY = {"world": "tiny", "seed": 3, "route_length": 1.0, "eye": Eye(width=60, he
 def test_failures_are_diagnosed_behind_a_mask():
     experiment = Experiment(**TINY, model="infomax", encoding="edges", start_offset=0.3)
     with experiment.opened() as trained:
-        examined = [trained.diagnostics.examine(step) for step, _ in experiment.steps(trained)]
+        examined = [trained.diagnostics.examine([step])[0] for step, _ in experiment.steps(trained)]
         step, _ = next(experiment.steps(trained))
         failed = dataclasses.replace(step, failure=StopReason.LOST)
-        diagnosis = trained.diagnostics.examine(failed)
+        diagnosis = trained.diagnostics.examine([failed])[0]
     assert examined
     assert diagnosis.recognised is not None
     assert diagnosis.nearest is not None
@@ -304,9 +304,9 @@ def test_what_is_close_behind_the_eye_does_not_cover_its_view():
     wall = np.array([[[-0.02, -9, -9], [-0.02, 9, -9], [-0.02, 0, 9]]])  # west of the eye
     world, field = world_of(wall, np.zeros((1, 3))), {"width": 72, "height": 30}
     east, west = Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, math.pi)
-    whole = covered_within(world, Eye(**field), east, 0.05)
-    assert covered_within(world, Eye(**field, field=math.pi), east, 0.05) == 0
-    assert covered_within(world, Eye(**field, field=math.pi), west, 0.05) == pytest.approx(2 * whole)
+    whole = covered_within(world, Eye(**field), [east], 0.05)
+    assert covered_within(world, Eye(**field, field=math.pi), [east], 0.05) == 0
+    assert covered_within(world, Eye(**field, field=math.pi), [west], 0.05) == pytest.approx(2 * whole)
 
 
 def test_a_recording_a_view_and_an_observation_show_what_is_visible(tmp_path, monkeypatch):

@@ -193,7 +193,7 @@ def test_invalid_poses_are_refused(poses, message):
 def test_occlusion_is_found_for_eyes_with_very_many_rays_in_a_row():
     """Its own rays lie in more rows than this eye has, for which the eye's samples would be too many."""
     eye = Eye(width=32768, height=1, samples=50)
-    assert 0 <= covered_within(random_world(), eye, Pose(0.0, 0.0, 0.0), 1.0) <= 1
+    assert 0 <= covered_within(random_world(), eye, [Pose(0.0, 0.0, 0.0)], 1.0) <= 1
 
 
 def test_no_poses_are_an_empty_array():

@@ -282,9 +282,9 @@ def test_an_eye_off_the_ground_is_refused_with_the_place_and_the_reason():
 def test_the_ground_beneath_the_eye_does_not_occlude():
     pose = Pose(3.0, 3.0, 0.0)
     world = mesh_world(hills()).on_mesh()
-    assert covered_within(world, EYE, pose, 0.05) == 0
+    assert covered_within(world, EYE, [pose], 0.05) == 0
     x, y, z = 3.0, 3.03, float(world.ground_height(MIDDLE)[0])
-    assert covered_within(mesh_world(hills(), post(x, y, z - 0.1, width=0.04)).on_mesh(), EYE, pose, 0.05) > 0.2
+    assert covered_within(mesh_world(hills(), post(x, y, z - 0.1, width=0.04)).on_mesh(), EYE, [pose], 0.05) > 0.2
 
 
 # Remarks
