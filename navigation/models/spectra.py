@@ -73,7 +73,8 @@ class Spectra:
         """
         transformed = one_by_one(torch.fft.rfft, views)
         # For each view two rows: Im(conj(V) F) is Re(conj(iV) F).
-        rows = torch.stack([_rows(transformed), _rows(1j * transformed)], dim=2)  # (f, n, 2, 2 h)
+        rows = _rows(torch.stack([transformed, 1j * transformed], dim=1).flatten(0, 1))
+        rows = rows.unflatten(1, (len(views), 2))  # (f, n, 2, 2 h)
         start, stop, _ = among.indices(len(self))
         for first, block in zip(range(0, stop, self.size), self._blocks, strict=False):
             inside = max(start - first, 0), min(stop - first, len(block))
