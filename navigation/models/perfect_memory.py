@@ -83,7 +83,7 @@ class PerfectMemory(IncrementalModel):
 
     def _compare(self, snapshots: Images) -> None:
         """Make the last snapshots ready to be compared, next to those before them."""
-        if is_partial(self.mask):
+        if self.mask is not None and self.mask.partial:
             self._overlaps = list(overlaps(self.snapshots, self.mask))
             return
         if self.mask is not None:
