@@ -22,7 +22,7 @@ from .rotations import one_by_one
 FILTERS, VIEWS = 1000, 16
 COLUMNS = 16  # to a multiple of which those of a product are filled up: all views' begin at a multiple of 64 bytes
 TERMS = 5  # of a sum that are added at once: numbers of rows are filled up to a multiple of it with 0
-SMALL = 2**24  # multiplications; below it, one thread is the quickest
+SMALL = 2**23  # multiplications; below it, one thread is the quickest
 
 
 class Spectra:
@@ -73,7 +73,8 @@ class Spectra:
         """
         transformed = one_by_one(torch.fft.rfft, views)
         # For each view two rows: Im(conj(V) F) is Re(conj(iV) F).
-        rows = torch.stack([_rows(transformed), _rows(1j * transformed)], dim=2)  # (f, n, 2, 2 h)
+        rows = _rows(torch.stack([transformed, 1j * transformed], dim=1).flatten(0, 1))
+        rows = rows.unflatten(1, (len(views), 2))  # (f, n, 2, 2 h)
         start, stop, _ = among.indices(len(self))
         for first, block in zip(range(0, stop, self.size), self._blocks, strict=False):
             inside = max(start - first, 0), min(stop - first, len(block))
@@ -98,14 +99,14 @@ def _columns(spectra: torch.Tensor) -> Float[torch.Tensor, "f parts m"]:
 
 def _multiplied(rows: torch.Tensor, filters: torch.Tensor, first: int, last: int) -> torch.Tensor:
     """The product of matrices rows (f, n, 2, k) x filters (f, k, first to last) at each frequency, as (2, n, f, columns)."""
-    frequencies, n, _, terms = rows.shape
+    frequencies, n = rows.shape[:2]
     if rows.device.type != "cpu":
         products = torch.bmm(rows.flatten(1, 2), filters[:, :, first:last])
         products = products.unflatten(1, (n, 2)).permute(2, 1, 0, 3)
         return torch.nn.functional.pad(products, (0, (first - last) % COLUMNS))
     products = torch.empty(2, n, frequencies, last - first + (first - last) % COLUMNS, dtype=rows.dtype)
     arrays = rows.numpy(), filters.numpy(), first, last, products.numpy()
-    large = 2 * rows[..., 0].numel() * terms * (last - first) >= SMALL
+    large = rows.numel() * (last - first) >= SMALL
     in_threads(lambda begin, end: _multiply(*arrays, begin, end), frequencies, torch.get_num_threads() if large else 1)
     return products
 
