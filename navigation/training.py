@@ -149,8 +149,9 @@ def training_views(
 def shared_views(model: object, views: Images) -> Images:
     """Views that a model has learned: its own tensor, where it keeps all of them as they are, so that they are in memory once."""
     kept = getattr(model, "snapshots", None)
-    same = isinstance(kept, torch.Tensor) and kept.device == views.device and torch.equal(kept, views)
-    return kept if same else views
+    if isinstance(kept, torch.Tensor) and kept.device == views.device and torch.equal(kept, views):
+        return kept
+    return views
 
 
 def train(
