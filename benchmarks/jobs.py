@@ -1,0 +1,228 @@
+"""Times whole jobs, those of this checkout and of another one alternately: make bench-jobs BASE=CHECKOUT PYTHON=its/python."""
+
+import argparse
+import json
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+from job_process import Measured, measure
+
+HERE = Path(__file__).parents[1]
+BIG = "tussock-field field_width=40 field_depth=40"
+README_SWEEP = (HERE / "README.md").read_text().split("```toml\n")[1].split("```")[0]
+MODELS_SWEEP = """
+[fixed]
+world = "tussock-field"
+size = "120x25"
+
+[axes]
+model = ["perfect-memory", "infomax"]
+seed = { from = 0, to = 1 }
+offset-m = [-0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25]
+"""
+SMALL_SWEEP = '[fixed]\nworld = "tiny"\nsize = "90x19"\n[axes]\nmodel = ["perfect-memory", "{model}"]\n'
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of the command line.
+
+    Attributes:
+        title: In the table.
+        arguments: Of tussock; {out} is the folder of the results.
+        quick: The same, of a small job that goes through the same code, to try the benchmark out.
+        rounds: How often it is done on each side; the best counts.
+        sweep: The text of sweep.toml, where the arguments name it.
+        quick_sweep: Likewise.
+    """
+
+    title: str
+    arguments: list[str]
+    quick: list[str]
+    rounds: int = 1
+    sweep: str = field(default="", kw_only=True)
+    quick_sweep: str = field(default="", kw_only=True)
+
+
+OUT = ["--out", "{out}"]
+POOR = ["--scan-deg", "60", "--on-lost", "reset", "--max-steps", "300"]
+SMALL = ["--world", "tiny", "--size", "90x19"]
+PROTOCOL = ["--quick", "--worlds", "1"]
+JOBS = {
+    "run": Job("a walk, recorded", ["run", *OUT], ["run", *SMALL, *OUT], 3),
+    "poor": Job(
+        "a recorded walk in a world of 40 m x 40 m, every step poor",
+        ["run", "--world", BIG, "--scan-about-deg", "{back}", *POOR, *OUT],
+        ["run", *SMALL, "--scan-about-deg", "{back}", *POOR, *OUT],
+        2,
+    ),
+    "sweep": Job(
+        "the sweep of README",
+        ["sweep", "sweep.toml", "--record", "worst:1", *OUT],
+        ["sweep", "sweep.toml", "--record", "worst:1", *OUT],
+        2,
+        sweep=README_SWEEP,
+        quick_sweep=SMALL_SWEEP.format(model="random"),
+    ),
+    "models": Job(
+        "a sweep of 2 models x 2 worlds x 10 starts",
+        ["sweep", "sweep.toml", *OUT],
+        ["sweep", "sweep.toml", *OUT],
+        2,
+        sweep=MODELS_SWEEP,
+        quick_sweep=SMALL_SWEEP.format(model="infomax"),
+    ),
+    "testbed": Job(
+        "the test bed, perfect memory, 108 runs",
+        ["benchmark", "--model", "perfect-memory", *OUT],
+        ["benchmark", "--model", "perfect-memory", "--quick", *OUT],
+    ),
+    "azevedo2025": Job(
+        "azevedo2025, one world, 45 starts",
+        ["replicate", "azevedo2025", "--worlds", "1", *OUT],
+        ["replicate", "azevedo2025", *PROTOCOL, *OUT],
+    ),
+    "ardin2016": Job(
+        "ardin2016 --quick", ["replicate", "ardin2016", "--quick", *OUT], ["replicate", "ardin2016", *PROTOCOL, *OUT]
+    ),
+    "baddeley2012": Job(
+        "baddeley2012, one world",
+        ["replicate", "baddeley2012", "--worlds", "1", *OUT],
+        ["replicate", "baddeley2012", *PROTOCOL, *OUT],
+    ),
+    "kagioulis2024": Job(
+        "kagioulis2024, one world",
+        ["replicate", "kagioulis2024", "--worlds", "1", *OUT],
+        ["replicate", "kagioulis2024", *PROTOCOL, *OUT],
+    ),
+    "thesis": Job(
+        "thesis --quick",
+        ["replicate", "thesis", "--quick", *OUT],
+        ["study", "setting", "--quick", "--size", "180x38", *OUT],
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Side:
+    """A checkout and the Python that runs it."""
+
+    name: str
+    checkout: Path
+    python: str
+
+    def command(self, arguments: list[str]) -> list[str]:
+        """A command of tussock. Earlier versions had their packages side by side, and no package tussock."""
+        module = "tussock.navigation.cli.main" if (self.checkout / "__init__.py").exists() else "navigation.cli"
+        return [self.python, "-c", f"from {module} import main; main()", *arguments]
+
+    def environment(self, link: Path) -> dict[str, str]:
+        """That it runs in: this checkout is the package tussock, whatever is installed."""
+        package = link / self.name
+        package.mkdir(exist_ok=True)
+        if not (package / "tussock").is_symlink():
+            (package / "tussock").symlink_to(self.checkout)
+        return {**os.environ, "PYTHONPATH": f"{package}{os.pathsep}{self.checkout}"}
+
+
+def main() -> None:
+    """Time the jobs, print each as it is done, and keep the numbers."""
+    options = _options()
+    sides = [Side("new", HERE, sys.executable)]
+    if options.base is not None:
+        sides.insert(0, Side("base", options.base.resolve(), options.python))
+    for key in options.only or JOBS:
+        with folder_of(options.keep) as folder:
+            rounds = 1 if options.quick else options.rounds or JOBS[key].rounds
+            measured = time_job(key, sides, folder, rounds, quick=options.quick)
+        print(line(key, measured), flush=True)
+        if options.results:
+            save(options.results, key, measured)
+
+
+def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: bool) -> dict[str, list[Measured]]:
+    """The measurements of a job on each side, side by side in each round."""
+    job = JOBS[key]
+    measured: dict[str, list[Measured]] = {side.name: [] for side in sides}
+    for number in range(rounds):
+        for side in sides:
+            work = folder / f"{key}-{side.name}-{number}"
+            work.mkdir(parents=True)
+            (work / "sweep.toml").write_text(job.quick_sweep if quick else job.sweep)
+            arguments = [each.format(out="out", back=BACK) for each in (job.quick if quick else job.arguments)]
+            measured[side.name].append(measure(side.command(arguments), work, side.environment(folder)))
+    return measured
+
+
+BACK = "180"  # degrees: the way that the walk of POOR looks
+
+
+def best(measured: list[Measured]) -> dict[str, float]:
+    """The best of some rounds in each respect."""
+    rounds = [asdict(each) for each in measured]
+    return {name: min(each[name] for each in rounds) for name in rounds[0]}
+
+
+def line(key: str, measured: Mapping[str, list[Measured]]) -> str:
+    """A job in one line: seconds and memory of each side, and the ratio."""
+    parts = []
+    for side, rounds in measured.items():
+        each = best(rounds)
+        parts.append(
+            f"{side} {each['seconds']:.1f} s, {each['cpu_seconds']:.1f} s of CPU, {each['peak_bytes'] / 1e6:,.0f} MB"
+        )
+    if len(measured) == 2:
+        base, new = (best(rounds) for rounds in measured.values())
+        parts.append(
+            f"{base['seconds'] / new['seconds']:.2f} times as fast ({base['cpu_seconds'] / new['cpu_seconds']:.2f} in CPU time)"
+        )
+    return f"{JOBS[key].title}: {'; '.join(parts)}"
+
+
+def save(path: Path, key: str, measured: Mapping[str, list[Measured]]) -> None:
+    """Add a job to the file of results."""
+    results = json.loads(path.read_text()) if path.exists() else {}
+    results[key] = {"machine": machine(), "at": datetime.now().isoformat(timespec="minutes")}
+    results[key] |= {side: [asdict(each) for each in rounds] for side, rounds in measured.items()}
+    path.write_text(json.dumps(results, indent=1) + "\n")
+
+
+def machine() -> str:
+    """The processor, and how many cores this process may use."""
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    names = [each.partition(":")[2].strip() for each in lines if each.startswith("model name")]
+    return f"{names[0] if names else platform.machine()}, {len(os.sched_getaffinity(0))} cores"
+
+
+@contextmanager
+def folder_of(keep: Path | None) -> Iterator[Path]:
+    """A folder for what jobs write: one that is kept, or one that is deleted."""
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+        yield keep.resolve()
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            yield Path(folder)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--base", type=Path, help="another checkout to compare with")
+    parser.add_argument("--python", default=sys.executable, help="the Python that runs it")
+    parser.add_argument("--only", type=lambda text: text.split(","), help=f"some of {','.join(JOBS)}")
+    parser.add_argument("--quick", action="store_true", help="small jobs, to try this out")
+    parser.add_argument("--rounds", type=int, help="in place of each job's own number")
+    parser.add_argument("--results", type=Path, help="add the numbers to this JSON file")
+    parser.add_argument("--keep", type=Path, help="keep what the jobs write in this new folder")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
