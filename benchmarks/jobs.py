@@ -27,6 +27,8 @@ model = ["perfect-memory", "infomax"]
 seed = { from = 0, to = 1 }
 offset-m = [-0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25]
 """
+ROUTE = "x_m,y_m,heading_deg\n" + "".join(f"{10 + each / 10:g},20,0\n" for each in range(81))  # 8 m to the east
+SMALL_ROUTE = "x_m,y_m,heading_deg\n" + "".join(f"{1 + each / 10:g},2,0\n" for each in range(11))
 SMALL_SWEEP = '[fixed]\nworld = "tiny"\nsize = "90x19"\n[axes]\nmodel = ["perfect-memory", "{model}"]\n'
 
 
@@ -36,48 +38,61 @@ class Job:
 
     Attributes:
         title: In the table.
-        arguments: Of tussock; {out} is the folder of the results.
+        arguments: Of tussock. It writes to the folder out.
         quick: The same, of a small job that goes through the same code, to try the benchmark out.
         rounds: How often it is done on each side; the best counts.
-        sweep: The text of sweep.toml, where the arguments name it.
-        quick_sweep: Likewise.
+        files: Texts of files that the arguments name.
+        quick_files: Likewise.
     """
 
     title: str
     arguments: list[str]
     quick: list[str]
     rounds: int = 1
-    sweep: str = field(default="", kw_only=True)
-    quick_sweep: str = field(default="", kw_only=True)
+    files: dict[str, str] = field(default_factory=dict, kw_only=True)
+    quick_files: dict[str, str] = field(default_factory=dict, kw_only=True)
 
 
-OUT = ["--out", "{out}"]
-POOR = ["--scan-deg", "60", "--on-lost", "reset", "--max-steps", "300"]
+OUT = ["--out", "out"]
+POOR = [
+    "--route",
+    "route.csv",
+    "--scan-about-deg",
+    "180",
+    "--scan-deg",
+    "60",
+    "--on-lost",
+    "reset",
+    "--max-steps",
+    "300",
+]  # it walks back
 SMALL = ["--world", "tiny", "--size", "90x19"]
 PROTOCOL = ["--quick", "--worlds", "1"]
 JOBS = {
     "run": Job("a walk, recorded", ["run", *OUT], ["run", *SMALL, *OUT], 3),
     "poor": Job(
         "a recorded walk in a world of 40 m x 40 m, every step poor",
-        ["run", "--world", BIG, "--scan-about-deg", "{back}", *POOR, *OUT],
-        ["run", *SMALL, "--scan-about-deg", "{back}", *POOR, *OUT],
+        ["run", "--world", BIG, *POOR, *OUT],
+        ["run", *SMALL, *POOR, *OUT],
         2,
+        files={"route.csv": ROUTE},
+        quick_files={"route.csv": SMALL_ROUTE},
     ),
     "sweep": Job(
         "the sweep of README",
         ["sweep", "sweep.toml", "--record", "worst:1", *OUT],
         ["sweep", "sweep.toml", "--record", "worst:1", *OUT],
         2,
-        sweep=README_SWEEP,
-        quick_sweep=SMALL_SWEEP.format(model="random"),
+        files={"sweep.toml": README_SWEEP},
+        quick_files={"sweep.toml": SMALL_SWEEP.format(model="random")},
     ),
     "models": Job(
         "a sweep of 2 models x 2 worlds x 10 starts",
         ["sweep", "sweep.toml", *OUT],
         ["sweep", "sweep.toml", *OUT],
         2,
-        sweep=MODELS_SWEEP,
-        quick_sweep=SMALL_SWEEP.format(model="infomax"),
+        files={"sweep.toml": MODELS_SWEEP},
+        quick_files={"sweep.toml": SMALL_SWEEP.format(model="infomax")},
     ),
     "testbed": Job(
         "the test bed, perfect memory, 108 runs",
@@ -108,6 +123,7 @@ JOBS = {
         ["study", "setting", "--quick", "--size", "180x38", *OUT],
     ),
 }
+WARM = ("run", "sweep", "models")  # small ones are done first, so that all is compiled
 
 
 @dataclass(frozen=True)
@@ -118,18 +134,25 @@ class Side:
     checkout: Path
     python: str
 
+    @property
+    def is_package(self) -> bool:
+        """Whether the checkout is a package tussock; earlier ones hold packages side by side."""
+        return (self.checkout / "__init__.py").exists()
+
     def command(self, arguments: list[str]) -> list[str]:
-        """A command of tussock. Earlier versions had their packages side by side, and no package tussock."""
-        module = "tussock.navigation.cli.main" if (self.checkout / "__init__.py").exists() else "navigation.cli"
+        """A command of tussock."""
+        module = "tussock.navigation.cli.main" if self.is_package else "navigation.cli"
         return [self.python, "-c", f"from {module} import main; main()", *arguments]
 
-    def environment(self, link: Path) -> dict[str, str]:
-        """That it runs in: this checkout is the package tussock, whatever is installed."""
-        package = link / self.name
-        package.mkdir(exist_ok=True)
-        if not (package / "tussock").is_symlink():
-            (package / "tussock").symlink_to(self.checkout)
-        return {**os.environ, "PYTHONPATH": f"{package}{os.pathsep}{self.checkout}"}
+    def environment(self, folder: Path) -> dict[str, str]:
+        """That it runs in: the checkout is what is imported, whatever is installed. `folder` gets a link."""
+        path = self.checkout
+        if self.is_package:
+            (path := folder / self.name).mkdir(exist_ok=True)
+            if not (path / "tussock").is_symlink():
+                (path / "tussock").symlink_to(self.checkout)
+        kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+        return kept | {"PYTHONPATH": str(path)}
 
 
 def main() -> None:
@@ -138,6 +161,10 @@ def main() -> None:
     sides = [Side("new", HERE, sys.executable)]
     if options.base is not None:
         sides.insert(0, Side("base", options.base.resolve(), options.python))
+    if not options.quick:
+        with folder_of(None) as folder:
+            for key in WARM:
+                time_job(key, sides, folder, 1, quick=True)
     for key in options.only or JOBS:
         with folder_of(options.keep) as folder:
             rounds = 1 if options.quick else options.rounds or JOBS[key].rounds
@@ -155,13 +182,11 @@ def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: b
         for side in sides:
             work = folder / f"{key}-{side.name}-{number}"
             work.mkdir(parents=True)
-            (work / "sweep.toml").write_text(job.quick_sweep if quick else job.sweep)
-            arguments = [each.format(out="out", back=BACK) for each in (job.quick if quick else job.arguments)]
-            measured[side.name].append(measure(side.command(arguments), work, side.environment(folder)))
+            for name, text in (job.quick_files if quick else job.files).items():
+                (work / name).write_text(text)
+            command = side.command(job.quick if quick else job.arguments)
+            measured[side.name].append(measure(command, work, side.environment(folder)))
     return measured
-
-
-BACK = "180"  # degrees: the way that the walk of POOR looks
 
 
 def best(measured: list[Measured]) -> dict[str, float]:
