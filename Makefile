@@ -40,7 +40,7 @@ bench: $(VENV)/developer  ## the benchmarks, into docs/performance.md; run it wh
 	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks worlds,$(VENV)/bench_$(part).json)
 
 bench-jobs: $(VENV)/developer  ## whole jobs, next to those of another checkout (BASE=CHECKOUT BASE_PYTHON=its python)
-	$(BIN)/python benchmarks/jobs.py $(if $(BASE),--base $(BASE) --python $(BASE_PYTHON)) --results $(VENV)/jobs.json $(JOBS)
+	$(BIN)/python benchmarks/jobs.py $(if $(BASE),--base $(BASE) --python $(BASE_PYTHON)) --results $(VENV)/jobs.json --docs $(JOBS)
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

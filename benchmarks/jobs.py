@@ -6,13 +6,18 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from array import array
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
-from job_process import Measured, measure
+import job_report
+from job_process import measure
+from job_results import compare
+from stages.sitecustomize import FOLDER, STAGES
 
 HERE = Path(__file__).parents[1]
 BIG = "tussock-field field_width=40 field_depth=40"
@@ -144,19 +149,22 @@ class Side:
         module = "tussock.navigation.cli.main" if self.is_package else "navigation.cli"
         return [self.python, "-c", f"from {module} import main; main()", *arguments]
 
-    def environment(self, folder: Path) -> dict[str, str]:
-        """That it runs in: the checkout is what is imported, whatever is installed. `folder` gets a link."""
+    def environment(self, folder: Path, work: Path) -> dict[str, str]:
+        """That it runs in: the checkout is what is imported, whatever is installed; `folder` gets a link, `work` the stages of ours."""
         path = self.checkout
         if self.is_package:
             (path := folder / self.name).mkdir(exist_ok=True)
             if not (path / "tussock").is_symlink():
                 (path / "tussock").symlink_to(self.checkout)
         kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-        return kept | {"PYTHONPATH": str(path)}
+        (stages := work / "stages").mkdir()
+        if self.checkout != HERE:  # functions of other versions have other names
+            return kept | {"PYTHONPATH": str(path)}
+        return kept | {"PYTHONPATH": f"{HERE / 'benchmarks' / 'stages'}{os.pathsep}{path}", FOLDER: str(stages)}
 
 
 def main() -> None:
-    """Time the jobs, print each as it is done, and keep the numbers."""
+    """Time the jobs, print each as it is done, and write the docs if asked to."""
     options = _options()
     sides = [Side("new", HERE, sys.executable)]
     if options.base is not None:
@@ -166,18 +174,22 @@ def main() -> None:
             for key in WARM:
                 time_job(key, sides, folder, 1, quick=True)
     for key in options.only or JOBS:
+        rounds = 1 if options.quick else options.rounds or JOBS[key].rounds
         with folder_of(options.keep) as folder:
-            rounds = 1 if options.quick else options.rounds or JOBS[key].rounds
             measured = time_job(key, sides, folder, rounds, quick=options.quick)
-        print(line(key, measured), flush=True)
+        print(job_report.line(measured), flush=True)
         if options.results:
-            save(options.results, key, measured)
+            kept = json.loads(options.results.read_text()) if options.results.exists() else {}
+            options.results.write_text(json.dumps(kept | {key: measured}, indent=1) + "\n")
+    if options.docs:
+        kept = json.loads(options.results.read_text())
+        job_report.write([kept[key] for key in JOBS if key in kept])
 
 
-def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: bool) -> dict[str, list[Measured]]:
-    """The measurements of a job on each side, side by side in each round."""
+def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: bool) -> dict[str, Any]:
+    """What a job takes on each side, one side after the other in each round, and whether the results are equal."""
     job = JOBS[key]
-    measured: dict[str, list[Measured]] = {side.name: [] for side in sides}
+    taken: dict[str, list[dict[str, Any]]] = {side.name: [] for side in sides}
     for number in range(rounds):
         for side in sides:
             work = folder / f"{key}-{side.name}-{number}"
@@ -185,38 +197,18 @@ def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: b
             for name, text in (job.quick_files if quick else job.files).items():
                 (work / name).write_text(text)
             command = side.command(job.quick if quick else job.arguments)
-            measured[side.name].append(measure(command, work, side.environment(folder)))
-    return measured
+            measured = measure(command, work, side.environment(folder, work))
+            taken[side.name].append(asdict(measured) | {"stages": stages_of(work)})
+    found = {"title": job.title, "machine": machine(), "at": datetime.now().isoformat(timespec="minutes")}
+    if len(sides) > 1:
+        found["results"] = str(compare(folder / f"{key}-base-0" / "out", folder / f"{key}-new-0" / "out"))
+    return found | taken
 
 
-def best(measured: list[Measured]) -> dict[str, float]:
-    """The best of some rounds in each respect."""
-    rounds = [asdict(each) for each in measured]
-    return {name: min(each[name] for each in rounds) for name in rounds[0]}
-
-
-def line(key: str, measured: Mapping[str, list[Measured]]) -> str:
-    """A job in one line: seconds and memory of each side, and the ratio."""
-    parts = []
-    for side, rounds in measured.items():
-        each = best(rounds)
-        parts.append(
-            f"{side} {each['seconds']:.1f} s, {each['cpu_seconds']:.1f} s of CPU, {each['peak_bytes'] / 1e6:,.0f} MB"
-        )
-    if len(measured) == 2:
-        base, new = (best(rounds) for rounds in measured.values())
-        parts.append(
-            f"{base['seconds'] / new['seconds']:.2f} times as fast ({base['cpu_seconds'] / new['cpu_seconds']:.2f} in CPU time)"
-        )
-    return f"{JOBS[key].title}: {'; '.join(parts)}"
-
-
-def save(path: Path, key: str, measured: Mapping[str, list[Measured]]) -> None:
-    """Add a job to the file of results."""
-    results = json.loads(path.read_text()) if path.exists() else {}
-    results[key] = {"machine": machine(), "at": datetime.now().isoformat(timespec="minutes")}
-    results[key] |= {side: [asdict(each) for each in rounds] for side, rounds in measured.items()}
-    path.write_text(json.dumps(results, indent=1) + "\n")
+def stages_of(work: Path) -> dict[str, float]:
+    """The seconds of each stage that the processes of a job wrote (see stages/sitecustomize.py); none where they wrote nothing."""
+    files = [array("d", path.read_bytes()) for path in (work / "stages").iterdir()]
+    return {name: sum(each[k] for each in files) for k, name in enumerate(STAGES)} if files else {}
 
 
 def machine() -> str:
@@ -245,6 +237,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="small jobs, to try this out")
     parser.add_argument("--rounds", type=int, help="in place of each job's own number")
     parser.add_argument("--results", type=Path, help="add the numbers to this JSON file")
+    parser.add_argument("--docs", action="store_true", help="write the table and the picture of --results into docs")
     parser.add_argument("--keep", type=Path, help="keep what the jobs write in this new folder")
     return parser.parse_args()
 
