@@ -3,6 +3,7 @@
 import ctypes
 import os
 import resource
+import signal
 import subprocess
 import time
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 INTERVAL = 0.25  # s between two looks at the memory
+PATIENCE = 30.0  # s that processes may go on after the one that started them
 PR_SET_CHILD_SUBREAPER = 36  # of Linux: processes whose parent has ended become ours, so that their times are counted
 
 
@@ -42,13 +44,20 @@ def measure(command: Sequence[str], folder: Path, environment: Mapping[str, str]
         job = subprocess.Popen(
             command, cwd=folder, env=dict(environment), stdout=file, stderr=file, start_new_session=True
         )
-    while (ended := _reap(job.pid)) is None:
-        peak = max(peak, _memory_of(job.pid))
-        time.sleep(INTERVAL)
-    seconds = time.perf_counter() - began
-    job.returncode = ended
-    while _reap(0) is None:  # what it leaves behind: servers of processes, which end by themselves
-        time.sleep(INTERVAL)
+    try:
+        while (ended := _reap(job.pid)) is None:
+            peak = max(peak, sum(map(_memory_of, _processes_of(job.pid))))
+            time.sleep(INTERVAL)
+        seconds = time.perf_counter() - began
+        job.returncode = ended
+        while (
+            _reap(0) is None and time.perf_counter() - began < seconds + PATIENCE
+        ):  # servers of processes, which end by themselves
+            time.sleep(INTERVAL / 10)
+    finally:
+        for process in _processes_of(job.pid):
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
     if ended:
         raise JobError(f"{' '.join(command)} ended with {ended}: {output.read_text(errors='replace')[-2000:]}")
     return Measured(seconds=seconds, cpu_seconds=_cpu_of_children() - before, peak_bytes=peak)
@@ -71,14 +80,20 @@ def _cpu_of_children() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _memory_of(session: int) -> int:
-    """Memory of the processes of a session: the proportional set sizes, of which shared pages count once (bytes)."""
-    total = 0
+def _processes_of(session: int) -> list[int]:
+    """The processes of a session, those that have ended and are not waited for aside."""
+    found = []
     for process in Path("/proc").iterdir():
-        if not process.name.isdecimal():
-            continue
-        with suppress(OSError, ValueError, StopIteration):  # it may end meanwhile
-            if os.getsid(int(process.name)) == session:
-                lines = (process / "smaps_rollup").read_text().splitlines()
-                total += 1024 * next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
-    return total
+        with suppress(OSError, ValueError):  # it may end meanwhile, or be no process
+            if os.getsid(number := int(process.name)) == session and (process / "cmdline").read_bytes():
+                found.append(number)
+    return found
+
+
+def _memory_of(process: int) -> int:
+    """Its proportional set size: of pages that processes share, each has its part (bytes)."""
+    with suppress(OSError):  # it may end meanwhile
+        for line in Path(f"/proc/{process}/smaps_rollup").read_text().splitlines():
+            if line.startswith("Pss:"):
+                return 1024 * int(line.split()[1])
+    return 0

@@ -71,7 +71,14 @@ def draw(jobs: Sequence[Mapping[str, Any]], path: Path) -> None:
 
 def table(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
     """The lines of the table: each job, with the other version in brackets."""
-    head = ("job", "seconds (before)", "ratio", "CPU seconds (before)", "peak memory, MB (before)", "results")
+    head = (
+        "job",
+        "seconds (before)",
+        "times as fast",
+        "CPU seconds (before)",
+        "peak memory, MB (before)",
+        "results, against before",
+    )
     rows = ["| " + " | ".join(head) + " |", "|---|---|---|---|---|---|"]
     for job in jobs:
         new = best(job["new"])
@@ -93,5 +100,8 @@ def write(jobs: Sequence[Mapping[str, Any]], docs: Path = DOCS) -> None:
     before, after = page.split(BEGIN)[0], page.split(END)[1]
     days = sorted({job["at"][:10] for job in jobs})
     machines = sorted({job["machine"] for job in jobs})
-    lines = [f"Machine: {'; '.join(machines)}; measured on {', '.join(days)}.", "", *table(jobs)]
+    versions = sorted({job["before"] for job in jobs if "before" in job})
+    before_is = f" Before: commit {', '.join(versions)}." if versions else ""
+    lines = [f"Machine: {'; '.join(machines)}; measured on {', '.join(days)}.{before_is}", "", *table(jobs)]
+    lines += ["", "![The share of each stage in the CPU time of each job](whole-jobs.svg)"]
     (docs / "performance.md").write_text(before + BEGIN + "\n" + "\n".join(lines) + "\n" + END + after)

@@ -78,7 +78,7 @@ Run = tuple[dict[str, Any], str]  # its results, and its trajectory as CSV
 
 def _compare_runs(base: dict[str, Run], new: dict[str, Run]) -> Comparison:
     found = Comparison("runs", unmatched=len(base.keys() ^ new.keys()))
-    for name in base.keys() & new.keys():
+    for name in sorted(base.keys() & new.keys()):
         (row, steps), (other_row, other_steps) = base[name], new[name]
         found.compared += 1
         differs = [
@@ -119,11 +119,10 @@ def compare_numbers(base: Any, new: Any) -> Comparison:
     """Compare all numbers that stand at the same place of two results, times aside."""
     one, other = dict(_numbers(base)), dict(_numbers(new))
     found = Comparison("numbers", unmatched=len(one.keys() ^ other.keys()))
-    for place in one.keys() & other.keys():
+    for place in sorted(one.keys() & other.keys()):
         found.compared += 1
         if not _equal(one[place], other[place]):
             found.differences.append(f"{place}: {one[place]} and {other[place]}")
-    found.differences.sort()
     return found
 
 

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import platform
+import subprocess
 import sys
 import tempfile
 from array import array
@@ -128,6 +129,10 @@ JOBS = {
         ["study", "setting", "--quick", "--size", "180x38", *OUT],
     ),
 }
+UNSET = (
+    "PYTHONDONTWRITEBYTECODE",
+    "OMP_NUM_THREADS",
+)  # of the environment, so that jobs run as they do for most people
 WARM = ("run", "sweep", "models")  # small ones are done first, so that all is compiled
 
 
@@ -156,7 +161,7 @@ class Side:
             (path := folder / self.name).mkdir(exist_ok=True)
             if not (path / "tussock").is_symlink():
                 (path / "tussock").symlink_to(self.checkout)
-        kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+        kept = {name: value for name, value in os.environ.items() if name not in UNSET}
         (stages := work / "stages").mkdir()
         if self.checkout != HERE:  # functions of other versions have other names
             return kept | {"PYTHONPATH": str(path)}
@@ -201,6 +206,8 @@ def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: b
             taken[side.name].append(asdict(measured) | {"stages": stages_of(work)})
     found = {"title": job.title, "machine": machine(), "at": datetime.now().isoformat(timespec="minutes")}
     if len(sides) > 1:
+        commit = ["git", "-C", str(sides[0].checkout), "rev-parse", "--short", "HEAD"]
+        found["before"] = subprocess.run(commit, capture_output=True, text=True).stdout.strip()
         found["results"] = str(compare(folder / f"{key}-base-0" / "out", folder / f"{key}-new-0" / "out"))
     return found | taken
 

@@ -40,7 +40,6 @@ class Clock:
     def __init__(self, folder: str):
         self.folder = folder
         self.begin()
-        os.register_at_fork(after_in_child=self.begin)
 
     def begin(self) -> None:
         """Begin anew: at the start of a process."""
@@ -137,4 +136,6 @@ class Finder(MetaPathFinder):
 
 
 if FOLDER in os.environ:
-    sys.meta_path.insert(0, Finder(Clock(os.environ[FOLDER])))
+    clock = Clock(os.environ[FOLDER])
+    os.register_at_fork(after_in_child=clock.begin)
+    sys.meta_path.insert(0, Finder(clock))
