@@ -59,6 +59,7 @@ def draw(jobs: Sequence[Mapping[str, Any]], path: Path) -> None:
         width = [100 * shares(took)[stage] for took in each]
         plot.barh(names, width, left=left, color=colour, label=stage)
         left = [a + b for a, b in zip(left, width, strict=True)]
+    plot.tick_params(labelsize=8)
     plot.set(xlabel="% of the CPU time", xlim=(0, 100))
     plot.invert_yaxis()
     plot.spines[["top", "right"]].set_visible(False)

@@ -5,7 +5,7 @@ import json
 import math
 import sqlite3
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,9 @@ import pandas as pd
 NEAR = 1e-6  # m of positions; and the same share of any number
 RESULTS = ("arrived", "steps", "mean_deviation_m")
 SHOWN = 3  # differences that are named
+
+Run = tuple[dict[str, Any], str]  # its results, and its trajectory as CSV
+Table = list[tuple[dict[str, Any], dict[str, Any], str]]  # settings, results and trajectory of each run of a sweep
 
 
 @dataclass
@@ -39,7 +42,7 @@ class Comparison:
     def __str__(self) -> str:
         text = f"{self.compared - len(self.differences)} of {self.compared} {self.of} equal"
         if self.apart is not None:
-            text += f", positions to {self.apart:.0e} m"
+            text += f", positions to {self.apart:.0e} m" if self.apart else ", positions to the last bit"
         if self.unmatched:
             text += f"; {self.unmatched} without a counterpart"
         return "; ".join([text, *self.differences[:SHOWN]])
@@ -57,23 +60,41 @@ def compare(base: Path, new: Path) -> Comparison:
 
 
 def compare_sweeps(base: Path, new: Path) -> Comparison:
-    """Compare the runs of two sweeps. A run is known by the settings that have the same values in both."""
+    """Compare the runs of two sweeps. A run is known by the settings that have the same values in both.
+
+    Raises ValueError where these do not tell the runs apart.
+    """
     tables = [_read(folder) for folder in (base, new)]
-    columns = [name for name in tables[0][0][0] if all(name in settings for settings, *_ in tables[1])]
-    values = [{name: {str(settings[name]) for settings, *_ in table} for name in columns} for table in tables]
-    shared = [name for name in columns if values[0][name] == values[1][name]]
-    varied = [name for name in shared if len(values[0][name]) > 1]
+    forms = {name: form for name in tables[0][0][0] if (form := _common_form(name, tables)) is not None}
     runs = [
-        {", ".join(f"{name} {settings[name]}" for name in varied): (row, steps) for settings, row, steps in table}
+        {
+            ", ".join(f"{name} {form(settings[name])}" for name, form in forms.items()): (row, steps)
+            for settings, row, steps in table
+        }
         for table in tables
     ]
     for of_runs, table in zip(runs, tables, strict=True):
         if len(of_runs) != len(table):
-            raise ValueError(f"{len(table)} runs have {len(of_runs)} different settings in {', '.join(varied)}")
+            raise ValueError(f"{len(table)} runs have {len(of_runs)} different settings in {', '.join(forms)}")
     return _compare_runs(*runs)
 
 
-Run = tuple[dict[str, Any], str]  # its results, and its trajectory as CSV
+def _common_form(name: str, tables: list[Table]) -> Callable[[Any], str] | None:
+    """The form in which a setting that varies has the same values in two sweeps: as text or, where versions write defaults
+    differently, its first word. None where it does not vary, or has other values.
+    """
+    if any(name not in settings for table in tables for settings, *_ in table):
+        return None
+    written = [{str(settings[name]) for settings, *_ in table} for table in tables]
+    for form in (str, _first_word):
+        one, other = ({form(text) for text in texts} for texts in written)
+        if one == other and 1 < len(one) == len(written[0]) == len(written[1]):
+            return form
+    return None
+
+
+def _first_word(value: Any) -> str:
+    return str(value).split(" ")[0]
 
 
 def _compare_runs(base: dict[str, Run], new: dict[str, Run]) -> Comparison:
@@ -107,8 +128,7 @@ def _run(folder: Path) -> Run:
     return json.loads((folder / "summary.json").read_text()), (folder / "trajectory.csv").read_text()
 
 
-def _read(folder: Path) -> list[tuple[dict[str, Any], dict[str, Any], str]]:
-    """Settings, results and trajectory of each run of a sweep."""
+def _read(folder: Path) -> Table:
     database = sqlite3.connect(folder / "finished.sqlite")
     found = database.execute("SELECT settings, row, steps FROM runs").fetchall()
     database.close()

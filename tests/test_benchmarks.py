@@ -105,6 +105,8 @@ def test_results_of_jobs_are_compared(tmp_path):
     found = str(compare(base, _sweep(tmp_path / "apart", 1.5)))
     assert found.startswith("0 of 2 runs equal; ")
     assert "seed 0: positions 5.0e-01 m apart" in found
+    models = [_sweep(tmp_path / name, model=name) for name in ("random", "random seed=1")]
+    assert "2 of 2 runs equal" in str(compare(*models))
     assert "seed 1: steps 2 and 3" in str(compare(base, _sweep(tmp_path / "longer", steps=3)))
     one, other = ({"a": [1.0, 2.0], "b": {"c": value}, "seconds": value} for value in (3, 4))
     assert str(compare_numbers(one, other)) == "2 of 3 numbers equal; /b/c: 3 and 4"

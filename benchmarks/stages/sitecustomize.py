@@ -20,6 +20,7 @@ STAGES = ("generate", "route", "train", "walk", "diagnose", "write")
 FUNCTIONS = {
     "tussock.navigation.surroundings": {"Surroundings.open_world": "generate", "Surroundings.open_route": "route"},
     "tussock.navigation.training": {"training_views": "train"},
+    "tussock.navigation.models.base": {"Model.fit": "train"},
     "tussock.navigation.experiment": {"Experiment.train": "train"},
     "tussock.navigation.studies.thesis.study_data": {"data_of_world": "train"},
     "tussock.navigation.walk": {"Walk.steps": "walk"},
