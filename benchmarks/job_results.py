@@ -107,21 +107,24 @@ def _compare_runs(base: dict[str, Run], new: dict[str, Run]) -> Comparison:
             for key in RESULTS
             if not _equal(row.get(key), other_row.get(key))
         ]
-        apart = math.inf if differs else _apart(steps, other_steps)
-        if apart > NEAR:
-            differs = differs or [f"positions {apart:.1e} m apart"]
+        apart = _apart(steps, other_steps)
+        far = np.flatnonzero(apart > NEAR)
+        if len(far):
+            differs.insert(0, f"{apart[far[0]]:.0e} m apart at step {far[0]}")
+        if differs:
             found.differences.append(f"{name}: {', '.join(differs)}")
         else:
-            found.apart = max(found.apart or 0.0, apart)
+            found.apart = max(found.apart or 0.0, *apart, 0.0)
     return found
 
 
-def _apart(base: str, new: str) -> float:
-    """The farthest that two agents are apart at the same step (m)."""
-    if not base and not new:  # neither could start
-        return 0.0
+def _apart(base: str, new: str) -> np.ndarray:
+    """(n,) How far two agents are apart at each of the steps that both make (m)."""
+    if not base or not new:  # one of them could not start
+        return np.zeros(0)
     one, other = (pd.read_csv(io.StringIO(text))[["x_m", "y_m"]].to_numpy(float) for text in (base, new))
-    return float(np.abs(one - other).max()) if len(one) == len(other) else math.inf
+    n = min(len(one), len(other))
+    return np.abs(one[:n] - other[:n]).max(axis=1, initial=0.0)
 
 
 def _run(folder: Path) -> Run:

@@ -104,7 +104,7 @@ def test_results_of_jobs_are_compared(tmp_path):
     )
     found = str(compare(base, _sweep(tmp_path / "apart", 1.5)))
     assert found.startswith("0 of 2 runs equal; ")
-    assert "seed 0: positions 5.0e-01 m apart" in found
+    assert "seed 0: 5e-01 m apart at step 1" in found
     models = [_sweep(tmp_path / name, model=name) for name in ("random", "random seed=1")]
     assert "2 of 2 runs equal" in str(compare(*models))
     assert "seed 1: steps 2 and 3" in str(compare(base, _sweep(tmp_path / "longer", steps=3)))
