@@ -39,8 +39,8 @@ bench: $(VENV)/developer  ## the benchmarks, into docs/performance.md; run it wh
 		$(BIN)/pytest benchmarks/bench_$$part.py --benchmark-quiet --benchmark-json=$(VENV)/bench_$$part.json || exit; done
 	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks worlds,$(VENV)/bench_$(part).json)
 
-bench-jobs: $(VENV)/developer  ## whole jobs, next to those of another checkout (BASE=CHECKOUT BASE_PYTHON=its python)
-	$(BIN)/python benchmarks/jobs.py $(if $(BASE),--base $(BASE) --python $(BASE_PYTHON)) --results $(VENV)/jobs.json --docs $(JOBS)
+bench-jobs: $(VENV)/developer  ## whole jobs, next to those of another checkout: BASE=CHECKOUT BASE_PYTHON=its/python OPTIONS="--only run,sweep"
+	$(BIN)/python benchmarks/jobs.py $(if $(BASE),--base $(BASE) --python $(BASE_PYTHON)) --results $(VENV)/jobs.json --docs $(OPTIONS)
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -90,7 +90,7 @@ def table(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
             cells.append(f"{new[name] * scale:{form}}{before}")
             if name == "seconds":
                 cells.append("" if old is None else f"{old['seconds'] / new['seconds']:.1f}")
-        rows.append("| " + " | ".join([*cells, job.get("results", "")]) + " |")
+        rows.append("| " + " | ".join([*cells, job.get("results", "").partition("; ")[0]]) + " |")
     return rows
 
 
