@@ -183,10 +183,10 @@ def main() -> None:
         with folder_of(options.keep) as folder:
             measured = time_job(key, sides, folder, rounds, quick=options.quick)
         print(job_report.line(measured), flush=True)
-        if options.results:
+        if options.results and not options.quick:
             kept = json.loads(options.results.read_text()) if options.results.exists() else {}
             options.results.write_text(json.dumps(kept | {key: measured}, indent=1) + "\n")
-    if options.docs:
+    if options.docs and not options.quick:
         kept = json.loads(options.results.read_text())
         job_report.write([kept[key] for key in JOBS if key in kept])
 
@@ -244,7 +244,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--base", type=Path, help="another checkout to compare with")
     parser.add_argument("--python", default=sys.executable, help="the Python that runs it")
     parser.add_argument("--only", type=lambda text: text.split(","), help=f"some of {','.join(JOBS)}")
-    parser.add_argument("--quick", action="store_true", help="small jobs, to try this out")
+    parser.add_argument("--quick", action="store_true", help="small jobs, to try this out; their numbers are not kept")
     parser.add_argument("--rounds", type=int, help="in place of each job's own number")
     parser.add_argument("--results", type=Path, help="add the numbers to this JSON file")
     parser.add_argument("--docs", action="store_true", help="write the table and the picture of --results into docs")
