@@ -1,4 +1,4 @@
-"""Times whole jobs, those of this checkout and of another one alternately: make bench-jobs BASE=CHECKOUT PYTHON=its/python."""
+"""Times whole jobs, those of this checkout and of another one alternately: make bench-jobs BASE=CHECKOUT BASE_PYTHON=its/python."""
 
 import argparse
 import json
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import job_report
-from job_process import measure
+from job_process import JobError, measure
 from job_results import compare
 from stages.sitecustomize import FOLDER, STAGES
 
@@ -178,10 +178,16 @@ def main() -> None:
         with folder_of(None) as folder:
             for key in WARM:
                 time_job(key, sides, folder, 1, quick=True)
+    failed = []
     for key in options.only or JOBS:
         rounds = 1 if options.quick else options.rounds or JOBS[key].rounds
-        with folder_of(options.keep) as folder:
-            measured = time_job(key, sides, folder, rounds, quick=options.quick)
+        try:
+            with folder_of(options.keep) as folder:
+                measured = time_job(key, sides, folder, rounds, quick=options.quick)
+        except JobError as error:  # the other jobs are still worth their time
+            print(f"{JOBS[key].title}: {error}", flush=True)
+            failed.append(key)
+            continue
         print(job_report.line(measured), flush=True)
         if options.results and not options.quick:
             kept = json.loads(options.results.read_text()) if options.results.exists() else {}
@@ -189,6 +195,7 @@ def main() -> None:
     if options.docs and not options.quick:
         kept = json.loads(options.results.read_text())
         job_report.write([kept[key] for key in JOBS if key in kept])
+    sys.exit(f"failed: {', '.join(failed)}" if failed else 0)
 
 
 def time_job(key: str, sides: list[Side], folder: Path, rounds: int, *, quick: bool) -> dict[str, Any]:
