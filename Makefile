@@ -1,10 +1,11 @@
 # What a person types. Everything happens in .venv; nothing else on the machine is touched.
 PYTHON ?= python3
+BASE_PYTHON ?= $(BASE)/.venv/bin/python
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: run test test-slow lint format bench clean
+.PHONY: run test test-slow lint format bench bench-jobs clean
 
 run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, and print how to watch it
 	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
@@ -37,6 +38,9 @@ bench: $(VENV)/developer  ## the benchmarks, into docs/performance.md; run it wh
 	for part in views matching walks worlds; do \
 		$(BIN)/pytest benchmarks/bench_$$part.py --benchmark-quiet --benchmark-json=$(VENV)/bench_$$part.json || exit; done
 	$(BIN)/python benchmarks/report.py $(foreach part,views matching walks worlds,$(VENV)/bench_$(part).json)
+
+bench-jobs: $(VENV)/developer  ## whole jobs, next to those of another checkout: BASE=CHECKOUT BASE_PYTHON=its/python OPTIONS="--only run,sweep"
+	$(BIN)/python benchmarks/jobs.py $(if $(BASE),--base $(BASE) --python $(BASE_PYTHON)) --results $(VENV)/jobs.json --docs $(OPTIONS)
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
