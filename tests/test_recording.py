@@ -162,6 +162,8 @@ def test_what_is_recorded_is_what_the_agent_sees_and_recognises(agent, tmp_path,
     charts = values_in(tmp_path / "r.rrd", "/familiarity@BarChart:values")
     assert [*charts] == [*images["view"]] == [*images["recognised"]] == [step.index for step in steps]
     for step in steps:
+        assert step.view is not None
+        assert step.familiarity is not None
         (learned,) = agent.renderer.render(agent.trained.poses[[step.match]])
         assert np.array_equal(images["view"][step.index], step.view[..., :3].ravel())
         assert np.array_equal(images["recognised"][step.index], learned[..., :3].ravel())
