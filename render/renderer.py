@@ -26,7 +26,7 @@ class Renderer(Protocol):
     backend: str
 
     def render(self, poses: Poses) -> Views:
-        """Draw the panoramas at some poses.
+        """Draw the panoramas at some poses. Several threads may call this at once, as a recording does while its walk goes on.
 
         Args:
             poses: (n, 3) x (m), y (m) and heading (rad).

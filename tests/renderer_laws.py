@@ -1,5 +1,7 @@
 """Laws of the CPU renderer that hold in worlds of any kind."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from scenes import random_poses
 
@@ -10,7 +12,7 @@ from tussock.world.scene import World
 
 
 def batches_and_threads_do_not_matter(renderer: ScanlineRenderer) -> None:
-    """A batch equals its views one by one, drawn with any number of threads."""
+    """A batch equals its views one by one, drawn with any number of threads, or by several threads at once."""
     poses = random_poses(7)
     batch = renderer.render(poses)
     assert all(np.array_equal(view, renderer.render([pose])[0]) for view, pose in zip(batch, poses, strict=True))
@@ -18,6 +20,8 @@ def batches_and_threads_do_not_matter(renderer: ScanlineRenderer) -> None:
         with ScanlineRenderer(renderer.world, renderer.eye, threads=threads) as other:
             assert np.array_equal(other.render(poses), batch)
             assert np.array_equal(other.render(poses[:1]), batch[:1])
+    with ThreadPoolExecutor(3) as threads:
+        assert all(np.array_equal(views, batch) for views in threads.map(renderer.render, [poses] * 6))
 
 
 def low_resolution_is_the_mean_over_each_pixels_solid_angle(world: World) -> None:

@@ -4,6 +4,9 @@ import csv
 import json
 import logging
 import shutil
+import time
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import attrs
@@ -121,6 +124,23 @@ def test_the_cache_changes_nothing(drawn, monkeypatch):
         monkeypatch.setattr("tussock.render.images.source.CACHE_BYTES", 3 * EYE.width * EYE.height * 4)
         for part in range(0, 40, 5):
             assert np.array_equal(views.render(poses[part : part + 5]), expected[part : part + 5])
+
+
+class Slow(OrderedDict):
+    """A cache that lets other threads work while it is being changed."""
+
+    def __setitem__(self, row, image):
+        super().__setitem__(row, image)
+        time.sleep(1e-4)
+
+
+def test_threads_share_a_source_of_views(drawn, monkeypatch):
+    poses = np.random.default_rng(1).uniform([0, 0, -3], [3, 3, 3], (40, 4, 3))
+    with open_views(*drawn[:2]) as views, ThreadPoolExecutor(4) as threads:
+        expected = [views.render(some) for some in poses]
+        monkeypatch.setattr("tussock.render.images.source.CACHE_BYTES", 0)
+        monkeypatch.setattr(views, "_kept", Slow())
+        assert all(map(np.array_equal, threads.map(views.render, poses), expected))
 
 
 @pytest.mark.parametrize(("spacing", "reach"), [(0.1, 0.1 * np.sqrt(2) / 2), (0.25, 0.25 * np.sqrt(2) / 2)])

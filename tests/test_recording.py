@@ -13,22 +13,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from tussock.navigation.agent import Agent
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.recording import log
+from tussock.navigation.recording.columns import image_columns
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.recording.run_folder import play
 from tussock.navigation.recording.viewer import viewer_program
 from tussock.navigation.training import train, training_poses
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
-from tussock.world.errors import FileError, InputError, MissingDependencyError
+from tussock.world.errors import DiskFullError, FileError, InputError, MissingDependencyError
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
@@ -133,6 +136,69 @@ def test_a_recording_verifies_and_holds_every_step(recorded):
     per_step = dict.fromkeys(PER_STEP, looks) | {"/world/path@LineStrips3D:strips": looks - 1}
     assert {column: rows[column] for column in PER_STEP} == per_step
     assert "/viewport" in rerun("rrd", "print", "-v", path)  # the blueprint
+
+
+def values_in(recording: Path, column: str) -> dict[int, Any]:
+    """The values of a column of an entity, by step."""
+    values = {}
+    for chunk in RrdReader(recording).stream():
+        table = chunk.to_record_batch()
+        entity, _, name = column.partition("@")
+        if chunk.entity_path == entity and {"step", name} <= {*table.schema.names}:
+            rows = zip(table.column("step").to_pylist(), table.column(name).to_pylist(), strict=True)
+            values |= {step: value[0] for step, value in rows if value is not None}
+    return values
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.05, 99.0])
+def test_what_is_recorded_is_what_the_agent_sees_and_recognises(agent, tmp_path, monkeypatch, seconds):
+    monkeypatch.setattr(log, "FLUSH_SECONDS", seconds)
+    monkeypatch.setattr(log, "BATCH", 7)
+    steps = list(agent.walk(agent.start(0.05)))
+    with Recording(tmp_path / "r.rrd", agent.renderer, agent.route, training_poses=agent.trained.poses) as recording:
+        for step in steps:
+            recording.log(step)
+    images = {name: values_in(tmp_path / "r.rrd", f"/{name}@Image:buffer") for name in ("view", "recognised")}
+    charts = values_in(tmp_path / "r.rrd", "/familiarity@BarChart:values")
+    assert [*charts] == [*images["view"]] == [*images["recognised"]] == [step.index for step in steps]
+    for step in steps:
+        assert step.view is not None
+        assert step.familiarity is not None
+        (learned,) = agent.renderer.render(agent.trained.poses[[step.match]])
+        assert np.array_equal(images["view"][step.index], step.view[..., :3].ravel())
+        assert np.array_equal(images["recognised"][step.index], learned[..., :3].ravel())
+        more = step.familiarity - step.familiarity.min()
+        ahead = len(more) // 2
+        chart = np.array(charts[step.index]["buffer"], dtype=np.float32)
+        assert charts[step.index]["shape"] == [len(more)]
+        assert np.isclose(chart[ahead - 1 : ahead + 1], more[0]).any()  # ahead is the middle
+        assert np.array_equal(np.sort(chart), np.sort(more))
+
+
+def test_views_without_alpha_are_recorded_as_the_eye_sees_them(tmp_path):
+    eye = Eye(width=60, height=12, field=np.pi)
+    views = np.random.default_rng(0).integers(0, 256, (3, 12, 60, 4), dtype=np.uint8)
+    expected = eye.hide(views)[..., :3].reshape(3, -1).tolist()
+    for given in (views, views[..., :3]):
+        (column,) = image_columns(eye, list(given))
+        assert [row[0] for row in column.as_arrow_array().to_pylist()] == expected
+
+
+def test_what_goes_wrong_while_writing_ends_the_walk(agent, tmp_path, monkeypatch):
+    def fail(self, steps):
+        raise DiskFullError("make room")
+
+    monkeypatch.setattr(log, "FLUSH_SECONDS", 0.0)
+    steps = list(islice(agent.walk(agent.start()), 2))
+    recording = Recording(tmp_path / "r.rrd", agent.renderer, agent.route)
+    recording.log(steps[0])
+    monkeypatch.setattr(Recording, "_send_steps", fail)
+    with pytest.raises(DiskFullError, match="make room"):
+        recording.log(steps[1])
+    with pytest.raises(DiskFullError, match="make room"):
+        recording.close()
+    rerun("rrd", "verify", tmp_path / "r.rrd")
+    assert rows_of(tmp_path / "r.rrd")["/world/agent@Arrows3D:origins"] == 1
 
 
 def test_steps_without_a_view_and_a_scan_are_recorded(agent, tmp_path):

@@ -1,18 +1,20 @@
 """Walks as rerun recordings.
 
 A recorder takes steps as they come and streams them to disk, so the walk knows nothing of it, and a crash leaves a recording that
-opens up to the crash. The blueprint travels inside the file: opening it needs no clicking.
+opens up to the crash. A thread of its own writes while the walk goes on. The blueprint travels inside the file: opening it needs no
+clicking.
 """
 
 import time
 import warnings
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float, Int64, UInt8
+from jaxtyping import Float, Int64
 
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
@@ -25,11 +27,13 @@ from ..stopping import StopReason
 from ..training import training_source
 from ..walk import Step
 from .blueprint import CAUSE_COLOURS, TIMELINE, blueprint, cause_entity, image_format
+from .columns import bar_chart_columns, image_columns
 from .viewer import check_viewer
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
 VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
-FLUSH_SECONDS = 0.5  # what a crash may lose of a recording
+FLUSH_SECONDS = 0.5  # how often steps are brought to disk; a crash may lose those of twice as long
+BATCH = 32  # steps whose views are sent at once: fresh memory for more of them takes longer than copying them
 MAX_FLUSH_SECONDS = 120.0  # rerun's writer sometimes ends without an answer where the disk is full
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible ..
 MARKS_ABOVE = 0.04  # m; .. and marks of poor steps above these
@@ -37,7 +41,10 @@ LABEL_SPACING = 0.6  # m; marks of one cause nearer than this to the one with it
 
 
 class Recording:
-    """A `.rrd` file being written; use it in a `with` statement and `log` each step."""
+    """A `.rrd` file being written; use it in a `with` statement and `log` each step.
+
+    A thread writes, and draws the learned views that are recognised; `log` and `close` raise what goes wrong there.
+    """
 
     def __init__(
         self,
@@ -62,7 +69,8 @@ class Recording:
             title: Shown with the recording; markdown.
         """
         self._path, self._renderer, self._training_poses = path, renderer, training_poses
-        self._waiting: list[tuple[Step, Diagnosis | None]] = []
+        self._new: list[tuple[Step, Diagnosis | None]] = []  # steps that the thread has not got yet,
+        self._waiting: list[tuple[Step, Diagnosis | None]] = []  # and those of which it has sent only the views
         self._previous: Step | None = None
         self._labelled: tuple[Cause, Pose] | None = None  # the cause that was last written at its mark, and where
         self._streams = [rr.RecordingStream("tussock")]
@@ -73,21 +81,43 @@ class Recording:
             self._streams.append(rr.RecordingStream("tussock"))
             self._streams[1].connect_grpc(live, default_blueprint=layout)
         self._log_surroundings(renderer.world, route, title)
-        self._flush()
+        self._thread = ThreadPoolExecutor(1, "recording")
+        self._writing = self._thread.submit(self._flush)
+        self._flushed = time.monotonic()
 
     def log(self, step: Step, diagnosis: Diagnosis | None = None) -> None:
-        """Add a step and its diagnosis. Steps are written together, those of FLUSH_SECONDS at a time."""
-        self._waiting.append((step, diagnosis))
-        if time.monotonic() - self._flushed > FLUSH_SECONDS:
-            self._flush()
+        """Add a step and its diagnosis. Waits for the thread where it is behind by more than FLUSH_SECONDS or BATCH steps.
+
+        Raises:
+            DiskFullError: Where the file cannot be written any more.
+        """
+        self._new.append((step, diagnosis))
+        if self._is_due() or len(self._new) == BATCH:
+            self._hand_over(flush=self._is_due())
+        if self._is_due():
+            self._writing.result()
 
     def close(self) -> None:
-        """Write what is left and close the file."""
+        """Write what is left and close the file. Raises DiskFullError where it cannot be written."""
         try:
-            self._flush()
+            self._hand_over(flush=True)
+            self._writing.result()
         finally:
+            self._thread.shutdown()
             for stream in self._streams:
                 stream.disconnect()
+
+    def _is_due(self) -> bool:
+        """Whether it is time to bring steps to disk."""
+        return time.monotonic() - self._flushed >= FLUSH_SECONDS
+
+    def _hand_over(self, *, flush: bool) -> None:
+        """Give the new steps to the thread, once it is done with the earlier ones. Raises what went wrong with those."""
+        self._writing.result()
+        new, self._new = self._new, []
+        self._writing = self._thread.submit(self._write, new, flush)
+        if flush:
+            self._flushed = time.monotonic()
 
     def __enter__(self) -> "Recording":
         return self
@@ -108,13 +138,22 @@ class Recording:
             for stream in self._streams:
                 stream.send_columns(entity, [when], columns)
 
+    def _write(self, steps: list[tuple[Step, Diagnosis | None]], flush: bool) -> None:
+        """Send the views of some steps, and, with a flush, what is left of all; called in the thread, as all that it calls."""
+        if steps and self._previous is None and not self._waiting:
+            self._log_constants(steps[0][0])
+        self._waiting += steps
+        self._send_views([step for step, _ in steps])
+        if flush:
+            waiting, self._waiting = self._waiting, []
+            if waiting:
+                self._send_steps([step for step, _ in waiting])
+                self._send_causes([(step, diagnosis) for step, diagnosis in waiting if diagnosis is not None])
+                self._log_events(waiting)
+            self._flush()
+
     def _flush(self) -> None:
         """Bring what was logged to disk; rerun by itself holds small things back until there are megabytes of them."""
-        waiting, self._waiting = self._waiting, []
-        if waiting:
-            self._send_steps([step for step, _ in waiting])
-            self._send_causes([(step, diagnosis) for step, diagnosis in waiting if diagnosis is not None])
-            self._log_events(waiting)
         file, *viewers = self._streams
         try:
             file.flush(timeout_sec=MAX_FLUSH_SECONDS)
@@ -126,7 +165,6 @@ class Recording:
             except RuntimeError as error:  # somebody closed it; the walk and its file go on
                 warnings.warn(f"the live viewer is gone ({error}); the walk goes on without it", stacklevel=2)
                 self._streams.remove(viewer)
-        self._flushed = time.monotonic()
 
     def _log_surroundings(self, world: World, route: Route, title: str) -> None:
         """What does not change: the world, the route, where views were learned, the names of curves."""
@@ -174,9 +212,7 @@ class Recording:
             self._log("familiarity", constant, static=True)
 
     def _send_steps(self, steps: list[Step]) -> None:
-        """Log what changes from step to step, and before the first one what does not."""
-        if self._previous is None:
-            self._log_constants(steps[0])
+        """What changes from step to step, but for the views."""
         here = np.array([_place(step) for step in steps])
         facing = _directions(np.array([step.pose.heading + step.turn for step in steps]), 0.2)
         self._send("world/agent", steps, rr.Arrows3D.columns(origins=here, vectors=facing))
@@ -184,34 +220,32 @@ class Recording:
         walked = [(before, step) for before, step in pairwise(known) if step.reset is None]
         strips = [np.array([_place(before), _place(step)]) for before, step in walked]
         self._send("world/path", [step for _, step in walked], rr.LineStrips3D.columns(strips=strips))
-        seen = [step for step in steps if step.view is not None]
-        if seen:
-            views = np.stack([step.view for step in seen if step.view is not None])
-            self._send("view", seen, _images(self._renderer.eye.hide(views)))
-        self._send_matches([step for step in steps if step.match is not None])
+        matched = [step for step in steps if step.match is not None]
+        if matched and self._training_poses is not None:
+            poses = self._training_poses[np.array([step.match for step in matched])]
+            arrows = rr.Arrows3D.columns(origins=self._above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
+            self._send("world/recognised", matched, arrows)
         self._send("deviation/m", steps, rr.Scalars.columns(scalars=[step.deviation for step in steps]))
         self._send("error/degrees", steps, rr.Scalars.columns(scalars=np.degrees([step.error for step in steps])))
-        for step in steps:
-            if step.familiarity is not None:
-                self._set_step(step)
-                # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
-                values = step.familiarity[_left_to_right(len(step.familiarity))] - step.familiarity.min()
-                self._log("familiarity", rr.BarChart(values))
+        scans = [(step, step.familiarity) for step in steps if step.familiarity is not None]
+        if scans:
+            charts = np.stack([familiarity for _, familiarity in scans])
+            # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
+            charts = charts[:, _left_to_right(charts.shape[1])] - charts.min(axis=1, keepdims=True)
+            self._send("familiarity", [step for step, _ in scans], bar_chart_columns(charts))
         self._previous = steps[-1]
 
-    def _set_step(self, step: Step) -> None:
-        for stream in self._streams:
-            stream.set_time(TIMELINE, sequence=step.index)
-
-    def _send_matches(self, steps: list[Step]) -> None:
-        """The learned views that were recognised, and where they were learned."""
-        if not steps or self._training_poses is None:
-            return
-        poses = self._training_poses[np.array([step.match for step in steps])]
-        views = self._renderer.eye.hide(training_source(self._renderer).render(poses))
-        self._send("recognised", steps, _images(views))
-        arrows = rr.Arrows3D.columns(origins=self._above(poses[:, :2]), vectors=_directions(poses[:, 2], 0.15))
-        self._send("world/recognised", steps, arrows)
+    def _send_views(self, steps: list[Step]) -> None:
+        """What the agent sees, and the learned views that it recognises."""
+        eye, seen = self._renderer.eye, [step for step in steps if step.view is not None]
+        if seen:
+            self._send("view", seen, image_columns(eye, [step.view for step in seen if step.view is not None]))
+        matched = [step for step in steps if step.match is not None]
+        if matched and self._training_poses is not None:
+            views = training_source(self._renderer).render(
+                self._training_poses[np.array([step.match for step in matched])]
+            )
+            self._send("recognised", matched, image_columns(eye, list(views)))
 
     def _send_causes(self, poor: list[tuple[Step, Diagnosis]]) -> None:
         """A mark where a step is poor or failed, in the colour of its cause; the first of several close marks has its name."""
@@ -238,9 +272,10 @@ class Recording:
         for step, diagnosis in steps:
             events = [step.reset and f"{step.reset}: put back on the route", step.reason or step.failure]
             events += [] if diagnosis is None else [str(diagnosis)]
-            self._set_step(step)
             level = rr.TextLogLevel.INFO if step.reason == StopReason.ARRIVED else rr.TextLogLevel.WARN
             for event in filter(None, events):
+                for stream in self._streams:
+                    stream.set_time(TIMELINE, sequence=step.index)
                 self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
 
 
@@ -251,11 +286,6 @@ def _place(step: Step, above: float = ABOVE) -> tuple[float, float, float]:
 
 def _directions(headings: Float[np.ndarray, " n"], length: float) -> Float[np.ndarray, "n 3"]:
     return length * np.column_stack([np.cos(headings), np.sin(headings), np.zeros(len(headings))])
-
-
-def _images(views: UInt8[np.ndarray, "n height width channels"]) -> Iterable[rr.ComponentColumn]:
-    """Images as a column; their format is logged once (`_log_constants`)."""
-    return rr.Image.columns(buffer=views[..., :3].reshape(len(views), -1))
 
 
 def _left_to_right(width: int) -> Int64[np.ndarray, " width"]:

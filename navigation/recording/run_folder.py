@@ -53,7 +53,8 @@ def record_run(
         walking: Called with how many steps are made, of how many there may be.
 
     Returns:
-        The summary of the walk (see `Trajectory.summary`), with seconds and steps_per_second of the walk alone.
+        The summary of the walk (see `Trajectory.summary`). Its seconds are those of the walk with its diagnosis and its
+        recording, until that is complete on disk; steps_per_second are the steps in this time.
 
     Raises:
         InputError: Where the folder is taken or cannot be written, and for what the experiment refuses.

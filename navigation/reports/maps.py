@@ -121,13 +121,13 @@ def _draw_world(axes: Axes, world: World) -> None:
     above_ground = triangles[..., 2].max(axis=1) - np.nan_to_num(world.ground_height(triangles[..., :2].mean(axis=1)))
     order = above_ground.argsort(kind="stable")  # lower ones first, so that higher ones cover them
     surfaces = PolyCollection(
-        list(triangles[order, :, :2]),
+        triangles[order, :, :2],  # as an array, which is taken as a whole
         facecolors=rgb[order] / 255,
         edgecolors="none",
         antialiased=False,
         rasterized=True,
     )
-    axes.add_collection(surfaces)
+    axes.add_collection(surfaces, autolim=False)  # the limits are those of the field
     x0, y0, x1, y1 = world.field
     margin = 0.04 * max(x1 - x0, y1 - y0)
     axes.set(xlim=(x0 - margin, x1 + margin), ylim=(y0 - margin, y1 + margin), xlabel=X_LABEL, ylabel=Y_LABEL)

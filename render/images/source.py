@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from jaxtyping import Bool, Float, Int64, UInt8
@@ -112,6 +113,7 @@ class DatabaseViews:
         channels = [_check_size(each, eye) for each in databases] + ([] if training is None else [training._channels])
         self._channels = min(channels)  # alpha is used where all images have it
         self._kept: OrderedDict[int, UInt8[np.ndarray, "height width channels"]] | None = OrderedDict()
+        self._lock = Lock()  # of the images kept; threads may share a renderer
 
     def nearest(self, poses: Poses) -> tuple[Int64[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """The row in `self.poses` of the entry that is nearest to each pose, and how far away it is (m)."""
@@ -130,7 +132,8 @@ class DatabaseViews:
             InputError: A pose is not finite or too far, an image cannot be read, or the source is closed.
         """
         rows, columns = self._turned(poses)
-        images = self._images(rows)
+        with self._lock:
+            images = self._images(rows)
         views = np.empty((len(rows), self.eye.height, self.eye.width, self._channels), dtype=np.uint8)
         for view, row, roll in zip(views, rows.tolist(), columns.tolist(), strict=True):
             view[:] = np.roll(images[row], roll, axis=1)
