@@ -5,7 +5,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Timer
 from typing import Any
 
 
@@ -35,18 +34,6 @@ def library_messages() -> Iterator[None]:
     finally:
         logger.removeHandler(handler)
         logger.setLevel(level)
-
-
-@contextmanager
-def message_when_slow(text: str, seconds: float = 1.0) -> Iterator[None]:
-    """Print a message once the block takes longer than `seconds`."""
-    timer = Timer(seconds, message, [text])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 @contextmanager
