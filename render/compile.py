@@ -48,16 +48,16 @@ class _Announcement(event.Listener):
     """Logs, once in a process, that functions are compiled: loading what was compiled before is no event."""
 
     def on_start(self, event: event.Event) -> None:
-        if (dispatcher := event.data["dispatcher"]) in _kept:
-            _say_compiling(dispatcher.stats.cache_path)
+        if event.data["dispatcher"] in _kept:
+            _say_compiling()
 
     def on_end(self, event: event.Event) -> None:
         pass
 
 
 @cache
-def _say_compiling(folder: str) -> None:
-    log.info(f"compiling for this processor, once: this takes some seconds; the result is kept in {folder}")
+def _say_compiling() -> None:
+    log.info("compiling for this processor, once: this takes some seconds")
 
 
 event.register("numba:compile", _Announcement())
