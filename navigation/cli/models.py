@@ -219,7 +219,7 @@ class PlayCommand(Command):
     """Save a picture (.png) of the viewer instead, without a display."""
 
     def run(self) -> dict[str, Any]:
-        from ..recording.run_folder import play
+        from ..recording.playback import play
 
         return play(self.run_folder, web=self.web, screenshot=self.screenshot)
 
