@@ -48,7 +48,7 @@ class _Announcement(event.Listener):
     """Logs, once in a process, that functions are compiled: loading what was compiled before is no event."""
 
     def on_start(self, event: event.Event) -> None:
-        if event.data["dispatcher"] in _kept:
+        if event.data is not None and event.data["dispatcher"] in _kept:
             _say_compiling()
 
     def on_end(self, event: event.Event) -> None:
