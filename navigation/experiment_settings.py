@@ -103,11 +103,11 @@ def run_command(experiment: Experiment, out: str) -> str:
 
 def _trained(given: Mapping[str, Any], models: "dict[Path, TrainedModel]") -> "TrainedModel | None":
     """The trained model that a setting names, if it does."""
-    from .models.files import load_model
-
     name = str(given.get("model", ""))
     if not name.endswith(MODEL_SUFFIX):
         return None
+    from .models.files import load_model
+
     path = Path(name)
     if path not in models:
         models[path] = load_model(path, device=given.get("device", "cpu"))

@@ -9,13 +9,17 @@ from types import ModuleType
 from typing import Any
 
 import numba
+from numba.core import event
+
+log = logging.getLogger(__name__)
 
 
 def compiled(function: Callable | None = None, *, uses: ModuleType | None = None, **options: Any) -> Any:
     """Decorator for a function that numba compiles; other threads run while it works.
 
-    The machine code is kept on disk for later processes. Where no folder for it can be written, for example in a read-only
-    installation without a home folder, each process compiles anew, and one warning says how to avoid that.
+    The machine code is kept on disk for later processes: next to the source, or in the user's folder for caches where the installation
+    is read-only. Where there is none yet, a line of the log says that it is made. Where neither folder can be written, for example
+    without a home folder, each process compiles anew, and one warning says how to avoid that.
 
     Args:
         function: The function, where the decorator is used without options.
@@ -29,15 +33,39 @@ def compiled(function: Callable | None = None, *, uses: ModuleType | None = None
     if uses is not None:  # what numba keeps is found by this name
         bare.__qualname__ += "_" + hashlib.sha256(inspect.getsource(uses).encode()).hexdigest()[:12]
     try:
-        return numba.njit(bare, nogil=True, cache=True, **options)
+        dispatcher = numba.njit(bare, nogil=True, cache=True, **options)
     except RuntimeError:  # numba found no folder for its cache
         _warn_without_cache()
         return numba.njit(bare, nogil=True, **options)
+    _kept.add(dispatcher)
+    return dispatcher
+
+
+_kept: set[Any] = set()  # what numba keeps on disk
+
+
+class _Announcement(event.Listener):
+    """Logs, once in a process, that functions are compiled: loading what was compiled before is no event."""
+
+    def on_start(self, event: event.Event) -> None:
+        if event.data is not None and event.data["dispatcher"] in _kept:
+            _say_compiling()
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+@cache
+def _say_compiling() -> None:
+    log.info("compiling for this processor, once: this takes some seconds")
+
+
+event.register("numba:compile", _Announcement())
 
 
 @cache
 def _warn_without_cache() -> None:
-    logging.getLogger(__name__).warning(
+    log.warning(
         "compiled code cannot be kept on disk, so each process compiles again, which takes some seconds; "
         "set NUMBA_CACHE_DIR to a writable folder"
     )

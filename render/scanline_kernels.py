@@ -242,7 +242,7 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
         begin = (box - leaves) * LEAF
         end = min(begin + LEAF, corners.shape[2])
         _find_columns(corners, begin, end, view, corner_columns, firsts, lasts)
-        count = 0
+        count = np.int64(0)  # not a literal, for which numba would compile another `_draw_spans`
         for i in range(begin, end):
             first, last = firsts[i - begin], lasts[i - begin]
             if first > last or (first >= stop and last < start + width) or (last < start):
@@ -287,7 +287,8 @@ def draw_views(triangles, rays, paint, lookup, poses, start, stop, keys, views):
     directions = np.empty((2, width))
     for i in range(len(poses)):
         x, y, heading, z = poses[i]
-        directions[0], directions[1] = np.cos(azimuths + heading), np.sin(azimuths + heading)
+        for j in range(width):  # by elements: numba compiles a check of shapes, with its message, for 2 s
+            directions[0, j], directions[1, j] = np.cos(azimuths[j] + heading), np.sin(azimuths[j] + heading)
         view = _View(x, y, z, heading, top, rows_per_rad, width, height, start * n, stop * n)
         keys[start * n : stop * n] = 0
         _draw(triangles, directions, tangents, view, keys, lookup)

@@ -24,22 +24,69 @@ def test_public_names_are_listed_and_can_be_loaded(room):
         assert getattr(module, name) is not None
 
 
-def test_importing_tussock_loads_nothing_heavy():
+HEAVY = "distributed matplotlib numba numpy pandas pyarrow rerun scipy sklearn torch trimesh"
+OF_FIGURES_AND_MODELS = "distributed matplotlib pandas pyarrow rerun sklearn torch"
+TINY = "--world tiny --size 60x12"
+
+
+WITHOUT_TORCH = """
+class Without:
+    def find_spec(self, name, path=None, target=None):
+        if name == "torch":
+            raise ModuleNotFoundError("No module named 'torch'", name="torch")
+sys.meta_path.insert(0, Without())
+"""
+
+
+def run_main(arguments: str, folder: Path, before: str = "") -> subprocess.CompletedProcess:
+    """Run the command line in a process of its own, which prints last of all what of HEAVY it has loaded."""
     script = (
-        "import sys, tussock; print({'numpy', 'torch', 'numba', 'rerun', 'pandas', 'matplotlib'} & set(sys.modules))"
+        f"import sys\n{before}\nfrom tussock.navigation.cli.main import main\n"
+        f"try: main({arguments.split()!r})\n"
+        f"finally: print(*(name for name in {HEAVY.split()!r} if sys.modules.get(name)), sep=',')"
     )
+    return subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True)
+
+
+def test_importing_tussock_loads_nothing_heavy():
+    script = f"import sys, tussock, tussock.navigation; print(set({HEAVY.split()!r}) & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
 
 
-def test_the_help_of_a_command_loads_nothing_heavy():
-    script = (
-        "import sys\nfrom tussock.navigation.cli.main import main\n"
-        "try: main(['run', '--help'])\nexcept SystemExit: pass\n"
-        "print({'numpy', 'torch', 'numba', 'rerun', 'pandas', 'matplotlib'} & set(sys.modules))"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.endswith("set()\n")
+@pytest.mark.parametrize(
+    ("arguments", "unneeded"),
+    [
+        ("--help", HEAVY),
+        ("run --help", HEAVY),
+        ("sweep --help", HEAVY),
+        ("world --preset tiny --out w.ply", OF_FIGURES_AND_MODELS),
+        (f"view {TINY}", OF_FIGURES_AND_MODELS),
+        ("route --world tiny --length-m 1", OF_FIGURES_AND_MODELS),
+        (f"database route {TINY} --route-length-m 1 --spacing-m 0.5 --out d", OF_FIGURES_AND_MODELS),
+        (f"run {TINY} --route-length-m 1 --spacing-m 0.2", "distributed sklearn trimesh"),
+    ],
+)
+def test_a_command_loads_nothing_heavy_that_it_does_not_need(arguments, unneeded, tmp_path):
+    loaded = run_main(arguments, tmp_path).stdout.splitlines()[-1].split(",")
+    assert not set(unneeded.split()) & set(loaded)
+
+
+def test_worlds_views_and_databases_do_without_torch(tmp_path):
+    for arguments in (
+        "world --preset tiny --out w.ply --picture w.png",
+        "view --world w.ply --size 60x12",
+        "route --world tiny --length-m 1",
+        f"database grid {TINY} --from-m 0,0 --to-m 1,1 --spacing-m 0.5 --out grid",
+        "database check grid",
+    ):
+        done = run_main(arguments, tmp_path, WITHOUT_TORCH)
+        assert done.returncode == 0, done.stderr
+    assert "there is no recording" in run_main("play nothing", tmp_path, WITHOUT_TORCH).stderr
+    for arguments in (f"run {TINY}", f"train {TINY}", "models"):
+        done = run_main(arguments, tmp_path, WITHOUT_TORCH)
+        assert done.returncode == 2
+        assert done.stderr.splitlines()[-1].startswith("tussock: this command needs torch")
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from tussock.navigation.models import PerfectMemory
 from tussock.navigation.recording import log
 from tussock.navigation.recording.columns import image_columns
 from tussock.navigation.recording.log import Recording
-from tussock.navigation.recording.run_folder import play
+from tussock.navigation.recording.playback import play
 from tussock.navigation.recording.viewer import viewer_program
 from tussock.navigation.training import train, training_poses
 from tussock.render.eye import Eye

@@ -111,6 +111,19 @@ def test_a_change_in_a_module_that_compiled_code_uses_is_noticed(tmp_path):
     assert seen == ["6", "6", "15"]
 
 
+def test_the_first_process_that_compiles_says_so_once(tmp_path):
+    (tmp_path / "tussock").symlink_to(CLONE)
+    code = "from tussock.render.compile import compiled\n"
+    for name in ("double", "triple"):
+        code += f"@compiled\ndef {name}(x):\n    return x * {len(name) - 4}\n"
+    (tmp_path / "caller.py").write_text(code)
+    script = "import logging; logging.basicConfig(level=20, format='%(message)s'); import caller; caller.double(1), caller.triple(1)"
+    said = [run_python(script, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stderr for _ in range(2)]
+    assert said[0].startswith("compiling")
+    assert said[0].count("\n") == 1
+    assert said[1] == ""
+
+
 def test_only_one_module_compiles():
     """So that all loops work without a cache."""
     files = [path for room in ("world", "render", "navigation") for path in (CLONE / room).rglob("*.py")]

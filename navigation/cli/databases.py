@@ -11,7 +11,7 @@ import tyro
 from tussock.world.errors import InputError, SettingError
 
 from ..training_setup import ROUTE_SPACING
-from .options import Command, RouteOptions, ViewOptions, open_renderer
+from .options import Command, RouteOptions, ViewOptions
 from .terminal import message, progress
 from .worlds import numbers
 
@@ -116,7 +116,7 @@ def write(options: ViewOptions, world: "World", poses: "Poses | Grid", out: Path
     from tussock.render.images.writing import write_database
 
     began = time.perf_counter()
-    with open_renderer(options.surroundings(), world) as renderer:
+    with options.surroundings().open_renderer(world) as renderer:
         message(f"renderer: {renderer.backend}")
         with progress("drawing", "views") as report:
             database, rendered = write_database(out, renderer, poses, report)

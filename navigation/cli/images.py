@@ -9,7 +9,7 @@ import tyro
 
 from tussock.world.errors import FileError, SettingError
 
-from .options import LearningOptions, ModelOptions, SourceOptions, open_renderer
+from .options import LearningOptions, ModelOptions, SourceOptions
 from .terminal import message, progress
 from .worlds import numbers
 
@@ -49,7 +49,7 @@ class RidfCommand(SourceOptions):
         experiment = self.experiment()
         world = experiment.open_world()
         route = None if self.at else experiment.open_route(world)
-        with open_renderer(experiment, world) as renderer:
+        with experiment.open_renderer(world) as renderer:
             message(f"renderer: {renderer.backend}")
             references = np.array([seen_at(self.at, renderer)]) if route is None else spread(route, self.apart_m)
             rotations = rotational(renderer, experiment.encoding, references, sides)
@@ -114,7 +114,7 @@ class CatchmentCommand(ModelOptions):
         route = None if self.at else experiment.open_route(world)
         if experiment.route_database is not None and experiment.grid_database is None:
             raise SettingError("a catchment needs views around the route; give --grid-database")
-        with open_renderer(experiment, world) as renderer:
+        with experiment.open_renderer(world) as renderer:
             message(f"renderer: {renderer.backend}")
             references = seen_at(self.at, renderer) if route is None else route_views_of(experiment, route)
             poses, spacing = positions_around(renderer, references, grid=self.grid_m, within=self.within_m)
@@ -206,7 +206,7 @@ class PlaceCommand(LearningOptions):
         experiment = self.experiment()
         world, route = experiment.open_world_and_route()
         queries = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
-        with open_renderer(experiment, world) as renderer:
+        with experiment.open_renderer(world) as renderer:
             message(f"renderer: {renderer.backend}")
             wanted = experiment.training_poses(world, route)
             with progress("comparing", "views") as report:

@@ -83,6 +83,10 @@ def main(arguments: list[str] | None = None) -> None:
             sys.exit(1)
     except InputError as error:
         fail(message_of(error, [name for name, value in vars(command).items() if value is not None], "--"))
+    except ModuleNotFoundError as error:
+        if error.name != "torch":
+            raise
+        fail("this command needs torch, which is not installed; install it: pip install torch")
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except RuntimeError as error:

@@ -13,7 +13,7 @@ import tyro
 from tussock.world.errors import FileError, SettingError
 
 from ..experiment import MODEL_SUFFIX
-from .options import Command, LearningOptions, ModelOptions, RunOptions, open_renderer
+from .options import Command, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
 
 
@@ -38,7 +38,7 @@ class EvaluateCommand(ModelOptions):
         experiment = self.experiment()
         world, route = experiment.open_world_and_route()
         positions = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
-        with open_renderer(experiment, world) as renderer:
+        with experiment.open_renderer(world) as renderer:
             message(f"renderer: {renderer.backend}")
             with progress("learning", "views") as report:
                 trained = experiment.train(renderer, route, report)
@@ -96,7 +96,7 @@ class TrainCommand(ModelOptions):
             )
         check_can_be_saved(model)
         world, route = experiment.open_world_and_route()
-        with open_renderer(experiment, world) as renderer, progress("drawing", "views") as report:
+        with experiment.open_renderer(world) as renderer, progress("drawing", "views") as report:
             wanted = experiment.training_poses(world, route)
             views, poses = training_views(experiment.encoding, renderer, wanted, report)
         message(f"learning {len(views)} views")
@@ -149,7 +149,7 @@ class CompareCommand(LearningOptions):
         world, route = experiment.open_world_and_route()
         positions = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
         rows = {}
-        with open_renderer(experiment, world) as renderer, progress("comparing", "models") as report:
+        with experiment.open_renderer(world) as renderer, progress("comparing", "models") as report:
             report(0, len(specs))
             for name, row in zip(
                 specs, compare_models(specs.values(), experiment, renderer, route, positions), strict=True
@@ -219,7 +219,7 @@ class PlayCommand(Command):
     """Save a picture (.png) of the viewer instead, without a display."""
 
     def run(self) -> dict[str, Any]:
-        from ..recording.run_folder import play
+        from ..recording.playback import play
 
         return play(self.run_folder, web=self.web, screenshot=self.screenshot)
 

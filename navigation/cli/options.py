@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import attrs
 import tyro
@@ -23,11 +23,6 @@ from ..settings_table import degrees
 from ..stopping import StoppingRules
 from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup
-from .terminal import message_when_slow
-
-if TYPE_CHECKING:
-    from tussock.render.renderer import Renderer
-    from tussock.world.scene import World
 
 WORLD = (
     "A preset's name (tussock-field, meadow, scrub, tiny), generated from a seed; its parameters may follow, as in "
@@ -251,14 +246,6 @@ def import_used(names: str) -> None:
         for name in filter(None, map(str.strip, names.split(","))):
             for registry in (MODELS, STEPS):
                 registry.find(name)
-
-
-def open_renderer(surroundings: Surroundings, world: "World") -> "Renderer":
-    """A renderer; a message tells what takes long, where it is compiled first."""
-    with message_when_slow(
-        "opening the renderer; where it is used for the first time, it is compiled, which takes some seconds"
-    ):
-        return surroundings.open_renderer(world)
 
 
 def flags_of(options: object, kind: type, leave_out: Collection[str] = ()) -> str:

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from logging.handlers import MemoryHandler
-from threading import Timer
 from typing import Any
 
 
@@ -56,18 +55,6 @@ def held_messages() -> Iterator[Callable[[bool], None]]:
         yield let_go
     finally:
         let_go(True)
-
-
-@contextmanager
-def message_when_slow(text: str, seconds: float = 1.0) -> Iterator[None]:
-    """Print a message once the block takes longer than `seconds`."""
-    timer = Timer(seconds, message, [text])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import tyro
 from tussock.world.errors import FileError, SettingError
 
 from ..surroundings import Surroundings
-from .options import WORLD, Command, MeshOptions, ViewOptions, open_renderer
+from .options import WORLD, Command, MeshOptions, ViewOptions
 from .terminal import message
 
 
@@ -66,7 +66,7 @@ class ViewCommand(ViewOptions):
         surroundings = self.surroundings()
         world = surroundings.open_world()
         x, y, heading_deg = self.position(world)
-        with open_renderer(surroundings, world) as renderer:
+        with surroundings.open_renderer(world) as renderer:
             view = renderer.render([(x, y, math.radians(heading_deg))])[0]
             backend = renderer.backend
         message(f"renderer: {backend}")

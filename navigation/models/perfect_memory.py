@@ -121,7 +121,8 @@ class PerfectMemory(IncrementalModel):
         of_views = energies(centred, None)[:, 0]
         squared = (of_views[:, None] + responses).cpu().numpy()
         tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max()).cpu().numpy()
-        _rescore(views.cpu().numpy(), self._on_cpu, index.cpu().numpy(), tolerance, squared)
+        undecided = squared <= (squared.min(axis=1) + tolerance)[:, None]
+        _rescore(views.cpu().numpy(), self._on_cpu, index.cpu().numpy(), undecided, squared)
         familiarity = -np.sqrt(squared / np.float32(height * width))
         return self._on_device(torch.from_numpy(familiarity)), index
 
@@ -154,13 +155,14 @@ class PerfectMemory(IncrementalModel):
 
 
 @compiled(fastmath={"reassoc"})
-def _rescore(views, snapshots, index, tolerance, squared):
-    """Compute squared distances (n, w) directly where rounding leaves open which of a view is the least, and next to these."""
+def _rescore(views, snapshots, index, undecided, squared):
+    """Compute squared distances (n, w) directly where rounding leaves undecided which of a view is the least, and next to these."""
     n, height, width = views.shape
     for v in range(n):
-        open = squared[v] <= squared[v].min() + tolerance[v]
         for turn in range(width):
-            if open[turn] or open[turn - 1] or open[(turn + 1) % width]:  # a heading is interpolated from three
+            if (
+                undecided[v, turn] or undecided[v, turn - 1] or undecided[v, (turn + 1) % width]
+            ):  # a heading is interpolated from three
                 snapshot = snapshots[index[v, turn]]
                 total = 0.0
                 for i in range(height):  # the view rolled right by `turn`

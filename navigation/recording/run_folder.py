@@ -1,9 +1,7 @@
-"""A run's folder: the recording of a walk, its trajectory, summary and picture; and playing it back."""
+"""A run's folder: the recording of a walk, its trajectory, summary and picture."""
 
 import json
-import logging
 import os
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +9,7 @@ from typing import Any
 
 from tussock.render.images.source import DatabaseViews
 from tussock.world.atomic import replacing
-from tussock.world.errors import FileError, MissingDependencyError
+from tussock.world.errors import FileError
 from tussock.world.progress import Progress, no_progress
 from tussock.world.route_files import write_route
 
@@ -20,15 +18,12 @@ from ..experiment_settings import run_command, settings_of
 from ..reports.maps import write_overview
 from ..trajectory import Trajectory
 from .log import Recording
-from .viewer import check_viewer, save_screenshot, watch
+from .playback import RECORDING, UNFINISHED
+from .viewer import check_viewer
 
-RECORDING, TRAJECTORY, SUMMARY = "recording.rrd", "trajectory.csv", "summary.json"
-PICTURE, ROUTE = "overview.png", "route.csv"
-UNFINISHED = "UNFINISHED.txt"  # is there until all the others are
+TRAJECTORY, SUMMARY, PICTURE, ROUTE = "trajectory.csv", "summary.json", "overview.png", "route.csv"
 FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE, UNFINISHED)
 TRAINING_SETTINGS = ("every", "learning_walk_m")  # settings that do not apply to a model from a file
-
-log = logging.getLogger(__name__)
 
 
 def record_run(
@@ -181,33 +176,3 @@ def _taken(out: Path) -> FileError:
 
 def _run_files(out: Path) -> list[Path]:
     return [out / name for name in FILES if (out / name).exists()]
-
-
-def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dict[str, Any]:
-    """Open a run's recording in the rerun viewer.
-
-    Args:
-        run: Folder of the run, or its recording.
-        web: Serve the viewer to browsers on this machine instead of opening a window.
-        screenshot: Write a picture (.png) of the viewer instead, without a display.
-
-    Raises:
-        FileError: Where there is no recording.
-        MissingDependencyError: Where there is no display, and neither `web` nor `screenshot`.
-    """
-    recording = run / RECORDING if run.is_dir() else run
-    if not recording.is_file():
-        raise FileError(f"there is no recording {recording}; give the folder of a run")
-    if (recording.parent / UNFINISHED).exists():
-        log.info(f"this run is not finished; see {recording.parent / UNFINISHED}")
-    if screenshot is not None and screenshot.suffix.lower() != ".png":
-        raise FileError(f"{screenshot}: a picture of the viewer is written as .png")
-    if screenshot is not None:
-        save_screenshot(recording, screenshot)
-        return {"recording": str(recording), "screenshot": str(screenshot)}
-    if not web and sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise MissingDependencyError(
-            "there is no display here; add --web to watch in a browser, or --screenshot FILE.png"
-        )
-    watch(recording, web=web)
-    return {"recording": str(recording)}

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image as PillowImage
@@ -80,44 +79,6 @@ def draw_over_circle(
     axes.plot(degrees, values, color=colour, lw=1.4, label=label, **style)
     axes.axvline(0, color=ROUTE_COLOUR, lw=0.9, zorder=0)
     axes.set(xlim=(-180, 180), xticks=range(-180, 181, 90), xlabel="degrees left of the set heading")
-
-
-def draw_error_boxes(
-    axes: Axes, table: pd.DataFrame, position: str, colour: str = ROUTE_COLOUR, shift: float = 0.0, width: float = 0.6
-) -> None:
-    """Draw box plots of heading errors, medians as lines and means as dots.
-
-    Args:
-        axes: Where to draw.
-        table: One box per row, with the columns of `box_of` (degrees).
-        position: Column of the boxes' positions.
-        colour: Colour of the boxes.
-        shift: Added to each position.
-        width: Width of a box.
-    """
-    keys = {
-        "med": "median_error_deg",
-        "q1": "lower_quartile_deg",
-        "q3": "upper_quartile_deg",
-        "whislo": "lower_whisker_deg",
-        "whishi": "upper_whisker_deg",
-        "mean": "mean_error_deg",
-    }
-    stats = [{key: row[column] for key, column in keys.items()} | {"fliers": []} for _, row in table.iterrows()]
-    axes.bxp(
-        stats,
-        positions=table[position] + shift,
-        widths=width,
-        showfliers=False,
-        showmeans=True,
-        patch_artist=True,
-        manage_ticks=False,
-        boxprops={"facecolor": colour + "33", "edgecolor": colour},
-        medianprops={"color": colour, "lw": 1.8},
-        whiskerprops={"color": colour},
-        capprops={"color": colour},
-        meanprops={"marker": "o", "markerfacecolor": colour, "markeredgecolor": "white", "markersize": 4},
-    )
 
 
 def draw_lines(axes: Axes, x, curves: Mapping[str, tuple], ylabel: str = "error (degrees)") -> None:

@@ -1,6 +1,7 @@
 """Figures of perfect memory: frequency, resolution and preprocessing."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -12,7 +13,6 @@ from ...reports.drawing import (
     SOFT_COLOUR,
     WIDE,
     canvas,
-    draw_error_boxes,
     draw_lines,
     draw_panorama,
 )
@@ -64,7 +64,7 @@ def _by_frequency(results: StudyResults, data: StudyData) -> Figure:
 def _frequency_boxes(results: StudyResults, data: StudyData) -> Figure:
     """Quartiles (boxes), values within 1.5 box lengths of them (whiskers), medians (lines) and means (dots)."""
     drawn, axes = canvas()
-    draw_error_boxes(axes[0, 0], results.tables["by_frequency"], "every")
+    _draw_error_boxes(axes[0, 0], results.tables["by_frequency"], "every")
     _label_errors(axes[0, 0], EVERY_NTH)
     return drawn
 
@@ -93,7 +93,7 @@ def _factor_boxes(results: StudyResults, data: StudyData) -> Figure:
     table = results.tables["by_factor"]
     for smoothed, colour, name in ((False, PATH_COLOUR, "sampled"), (True, ROUTE_COLOUR, "smoothed")):
         rows = table[(table["resizing"] == "sampled") & (table["smoothed"] == smoothed)]
-        draw_error_boxes(axes[0, 0], rows, "factor", colour, shift=0.2 if smoothed else -0.2, width=0.35)
+        _draw_error_boxes(axes[0, 0], rows, "factor", colour, shift=0.2 if smoothed else -0.2, width=0.35)
         axes[0, 1].plot(rows["factor"], rows["published_mean_error_deg"], "--", color=colour, lw=1)
         means = {name: (rows["mean_error_deg"], colour, "o-")}
         draw_lines(axes[0, 1], rows["factor"], means, ylabel="mean error (degrees)")
@@ -115,3 +115,41 @@ def _preprocessing(results: StudyResults, data: StudyData) -> Figure:
 
 def _label_errors(axes: Axes, xlabel: str) -> None:
     axes.set(xlabel=xlabel, ylabel="error (degrees)", ylim=(0, 180), yticks=range(0, 181, 45))
+
+
+def _draw_error_boxes(
+    axes: Axes, table: pd.DataFrame, position: str, colour: str = ROUTE_COLOUR, shift: float = 0.0, width: float = 0.6
+) -> None:
+    """Draw box plots of heading errors, medians as lines and means as dots.
+
+    Args:
+        axes: Where to draw.
+        table: One box per row, with the columns of `box_of` (degrees).
+        position: Column of the boxes' positions.
+        colour: Colour of the boxes.
+        shift: Added to each position.
+        width: Width of a box.
+    """
+    keys = {
+        "med": "median_error_deg",
+        "q1": "lower_quartile_deg",
+        "q3": "upper_quartile_deg",
+        "whislo": "lower_whisker_deg",
+        "whishi": "upper_whisker_deg",
+        "mean": "mean_error_deg",
+    }
+    stats = [{key: row[column] for key, column in keys.items()} | {"fliers": []} for _, row in table.iterrows()]
+    axes.bxp(
+        stats,
+        positions=table[position] + shift,
+        widths=width,
+        showfliers=False,
+        showmeans=True,
+        patch_artist=True,
+        manage_ticks=False,
+        boxprops={"facecolor": colour + "33", "edgecolor": colour},
+        medianprops={"color": colour, "lw": 1.8},
+        whiskerprops={"color": colour},
+        capprops={"color": colour},
+        meanprops={"marker": "o", "markerfacecolor": colour, "markeredgecolor": "white", "markersize": 4},
+    )
