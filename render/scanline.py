@@ -37,7 +37,8 @@ from .colour_kernels import PLAIN
 from .cores import core_count
 from .eye import Eye
 from .poses import Poses, Views, poses_of_eye
-from .scanline_kernels import LEAF, draw_views
+from .culling_kernels import LEAF
+from .scanline_kernels import draw_views
 from .triangle_tree import TriangleTree
 
 
@@ -45,7 +46,7 @@ class Triangles(NamedTuple):
     """What the loops draw.
 
     Attributes:
-        corners: (3, 3, n) x, y, z (m) of the three corners of each triangle, see `TriangleTree`.
+        corners: (leaves, 3, 3, LEAF) x, y, z (m) of the three corners of each triangle, see `TriangleTree`.
         labels: (n,) a number over 0 for each triangle; of equally near ones, the one with the greatest label is seen.
         boxes: (m, 6) see `TriangleTree`.
         cull: Whether triangles are seen from their front only.

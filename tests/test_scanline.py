@@ -198,11 +198,12 @@ def test_every_box_of_the_tree_contains_its_triangles_and_its_parts():
     triangles, _ = world.surfaces()
     tree = TriangleTree.of(triangles, 8)
     assert sorted(tree.order) == list(range(len(triangles)))
-    assert np.array_equal(tree.corners, triangles[tree.order].transpose(2, 1, 0))
+    corners = tree.corners.transpose(0, 3, 2, 1).reshape(-1, 3, 3)
+    assert np.array_equal(corners[: len(triangles)], triangles[tree.order])
     leaves = len(tree.boxes) // 2
     for k, (*low, x1, y1, z1) in enumerate(tree.boxes):
         if k >= leaves:
-            inside = tree.corners[..., (k - leaves) * 8 : (k - leaves + 1) * 8].reshape(3, -1)
+            inside = corners[: len(triangles)][(k - leaves) * 8 : (k - leaves + 1) * 8].reshape(-1, 3).T
         elif k >= 1:
             inside = np.hstack([tree.boxes[2 * k : 2 * k + 2, :3].T, tree.boxes[2 * k : 2 * k + 2, 3:].T])
             inside = inside[:, np.isfinite(inside).all(axis=0)]
