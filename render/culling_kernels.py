@@ -7,6 +7,8 @@ import numpy as np
 from .compile import compiled
 
 LEAF = 32  # triangles in a box of the lowest level; the fastest of 16 to 64
+FAN = 16  # boxes that are looked at together
+MAX_STACK = 256  # boxes to visit; FAN of each fourth of 60 levels are fewer
 _MAX_LOOKUPS = 4096  # pixels that are looked at to find out whether a box is hidden
 
 # Coefficients of atan(x) / x as a polynomial in x^2 on [0, 1]. It finds candidates, which exact tests follow.
@@ -15,7 +17,8 @@ _ATAN = tuple(np.polynomial.polynomial.polyfit(_x**2, np.arctan(_x) / _x, 7).tol
 ATAN_ERROR = 1e-6  # rad; the polynomial is within 2e-7
 _ATAN_32, _HALF_TURN, _TINY = tuple(map(np.float32, _ATAN)), np.float32(np.pi), np.float32(1e-30)
 _HUGE, _INF, _SLACK = np.float32(1e30), np.float32(np.inf), np.float32(1e-6)
-_ATAN_ERROR_32 = 5e-6  # rad; with the rounding of what columns and rows are computed from
+_MORE, _BULGE = np.float32(1.000002), np.float32(0.5 * np.pi - 1)
+_ERROR_32 = np.float32(5e-6)  # rad; with the rounding of what columns and rows are computed from
 
 
 class View(NamedTuple):
@@ -47,12 +50,6 @@ def _atan2(y, x):
 
 
 @compiled(inline="always")
-def column_of(dx, dy, heading, width):
-    """Column (fractional, not wrapped) of a point that is (dx, dy) away, within ATAN_ERROR."""
-    return (np.pi - (_atan2(dy, dx) - heading)) * (width / (2 * np.pi)) - 0.5
-
-
-@compiled(inline="always")
 def row_of(tangent, view):
     """Row (fractional) with a tangent, within ATAN_ERROR."""
     return (view.top - _atan2(tangent, 1.0)) * view.rows_per_rad - 0.5
@@ -60,7 +57,7 @@ def row_of(tangent, view):
 
 @compiled(error_model="numpy", inline="always")
 def _atan2_32(y, x):
-    """`_atan2` in float32, within _ATAN_ERROR_32 (rad)."""
+    """`_atan2` in float32, within _ERROR_32 (rad)."""
     ax, ay, zero = abs(x), abs(y), np.float32(0)
     q = min(ax, ay) / (max(ax, ay) + _TINY)
     s = q * q
@@ -108,10 +105,10 @@ def find_candidates(corners, n, view, work, found):
     x, y, z = view.x, view.y, view.z
     heading = np.float32(view.heading - 2 * np.pi * np.floor(view.heading / (2 * np.pi)))
     wide, turns, per_rad = np.float32(width), np.float32(1 / width), np.float32(width / (2 * np.pi))
-    pad = np.float32(_ATAN_ERROR_32 * width / (2 * np.pi) + 1e-5)
+    pad = _ERROR_32 * per_rad + np.float32(1e-5)
     half, middle = np.float32(0.5) * wide - pad, (_HALF_TURN + heading) * per_rad - np.float32(0.5)
     top, rows_per_rad, bottom_row = np.float32(view.top), np.float32(view.rows_per_rad), np.float32(view.height - 1)
-    row_pad = np.float32(_ATAN_ERROR_32 * view.rows_per_rad + 1e-5)
+    row_pad = _ERROR_32 * rows_per_rad + np.float32(1e-5)
     for k in range(3):
         for i in range(n):  # without branches, so that it is vectorised
             dx, dy = np.float32(corners[0, k, i] - x), np.float32(corners[1, k, i] - y)
@@ -159,43 +156,92 @@ def key_of(nearness, label):
     return np.int64(np.float32(nearness).view(np.int32)) << 32 | label
 
 
-@compiled(error_model="numpy", inline="always")
-def _rows_of_box(z0, z1, near, far, view):
-    """First and last row that may show a box from z0 to z1 above the eye and from near to far away, over the ground."""
-    low, high = z0 / (near if z0 < 0.0 else far), z1 / (near if z1 > 0.0 else far)
-    low, high = low - 1e-9 * (1 + abs(low)), high + 1e-9 * (1 + abs(high))
-    pad = 1e-6 + ATAN_ERROR * view.rows_per_rad
-    first = np.int64(max(np.ceil(row_of(high, view) - pad), 0.0))
-    return first, np.int64(min(np.floor(row_of(low, view) + pad), view.height - 1.0))
+@compiled(error_model="numpy")
+def find_boxes(boxes, begin, n, view, work):
+    """Find out in which pixels boxes begin..begin+n-1 may be seen: all of those, and few others.
+
+    A circle around a box, of radius r at the distance d, has the angle 2 asin(q), q = r / d; asin(q) <= q + (pi / 2 - 1) q^3.
+
+    Args:
+        work: (8 * FAN,) of float32. Its first parts of FAN numbers become the first and the last column (see `find_candidates`),
+            the first and the last row, the distance of the nearest point (m) and the square of that of the middle (m^2), over the
+            ground, and 1 where a pixel is left, else 0.
+    """
+    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
+    x, y, z, wide, bottom = view.x, view.y, view.z, np.float32(view.width), np.float32(view.height - 1)
+    start, stop, per_rad = np.float32(view.start), np.float32(view.stop), np.float32(view.width / (2 * np.pi))
+    heading = np.float32(view.heading - 2 * np.pi * np.floor(view.heading / (2 * np.pi)))
+    turns, middle = np.float32(1 / view.width), (_HALF_TURN + heading) * per_rad - half
+    top, rows_per_rad = np.float32(view.top), np.float32(view.rows_per_rad)
+    pad, row_pad = _ERROR_32 + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
+    for i in range(n):  # without branches, so that it is vectorised
+        k = begin + i
+        x0, y0, z0 = np.float32(boxes[k, 0] - x), np.float32(boxes[k, 1] - y), np.float32(boxes[k, 2] - z)
+        x1, y1, z1 = np.float32(boxes[k, 3] - x), np.float32(boxes[k, 4] - y), np.float32(boxes[k, 5] - z)
+        nx, ny, fx, fy = max(zero, max(x0, -x1)), max(zero, max(y0, -y1)), max(-x0, x1), max(-y0, y1)
+        near, far = np.sqrt(nx * nx + ny * ny), np.sqrt(fx * fx + fy * fy)
+        dx, dy, sx, sy = x1 - x0, y1 - y0, x0 + x1, y0 + y1
+        away = sx * sx + sy * sy
+        q = np.sqrt((dx * dx + dy * dy) / (away + _TINY)) * _MORE
+        around = (near <= zero) | (q >= one)
+        low, high = z0 / ((near if z0 < zero else far) + _TINY), z1 / ((near if z1 > zero else far) + _TINY)
+        first_row = np.ceil((top - _atan2_32(high, one)) * rows_per_rad - half - row_pad)
+        last_row = np.floor((top - _atan2_32(low, one)) * rows_per_rad - half + row_pad)
+        first_row, last_row = (zero if around else max(first_row, zero)), (bottom if around else min(last_row, bottom))
+        column, reach = middle - _atan2_32(sy, sx) * per_rad, (q + _BULGE * q * q * q + pad) * per_rad
+        first, last = np.ceil(column - reach), np.floor(column + reach)
+        shift = np.floor(first * turns + np.float32(1e-6)) * wide
+        first, last = (zero if around else first - shift), (wide - one if around else last - shift)
+        outside = (first > last) | ((first >= stop) & (last < start + wide)) | (last < start)
+        work[i], work[FAN + i], work[2 * FAN + i], work[3 * FAN + i] = first, last, first_row, last_row
+        work[4 * FAN + i], work[5 * FAN + i] = near, away
+        work[6 * FAN + i] = zero if outside | (first_row > last_row) | (x0 > x1) else one
+
+
+@compiled
+def push_parts(boxes, box, view, work, stack, size):
+    """Put the parts of a box on the stack, the nearest on top, if they may be seen.
+
+    Args:
+        box: Its index.
+        work: (8 * FAN,) of float32.
+        stack: (MAX_STACK, 6) of boxes: index, first and last column, first and last row, distance of the nearest point (m).
+        size: Boxes on the stack.
+
+    Returns:
+        Boxes on the stack then.
+    """
+    begin, n = 2 * box, 2
+    while n < FAN and begin < len(boxes) // 2:  # parts of parts
+        begin, n = 2 * begin, 2 * n
+    find_boxes(boxes, begin, n, view, work)
+    bottom = size
+    for k in range(n):
+        if work[6 * FAN + k] == 0:
+            continue
+        away, at = work[5 * FAN + k], size
+        while at > bottom and work[7 * FAN + at - 1 - bottom] < away:
+            work[7 * FAN + at - bottom] = work[7 * FAN + at - 1 - bottom]
+            for i in range(6):
+                stack[at, i] = stack[at - 1, i]
+            at -= 1
+        work[7 * FAN + at - bottom], stack[at, 0] = away, begin + k
+        for i in range(5):
+            stack[at, 1 + i] = work[i * FAN + k]
+        size += 1
+    return size
 
 
 @compiled(error_model="numpy")
-def invisible(boxes, k, view, keys):
-    """Whether nothing in box k can be seen in the columns drawn: it lies between the rays, or behind what is drawn already."""
-    width, start, stop = view.width, view.start, view.stop
-    x0, y0, z0 = boxes[k, 0] - view.x, boxes[k, 1] - view.y, boxes[k, 2] - view.z
-    x1, y1, z1 = boxes[k, 3] - view.x, boxes[k, 4] - view.y, boxes[k, 5] - view.z
-    if x0 > x1:  # empty
-        return True
-    near = np.sqrt(max(x0, -x1, 0.0) ** 2 + max(y0, -y1, 0.0) ** 2)
-    far = np.sqrt(max(-x0, x1) ** 2 + max(-y0, y1) ** 2)
-    # A circle around the box, of radius r at distance d, has the angle 2 asin(q), q = r / d; asin(q) <= q + (pi / 2 - 1) q^3.
-    q = np.sqrt(((x1 - x0) ** 2 + (y1 - y0) ** 2) / ((x0 + x1) ** 2 + (y0 + y1) ** 2))
-    if near == 0.0 or q >= 1.0:
-        return False
-    top_row, bottom_row = _rows_of_box(z0, z1, near, far, view)
-    if top_row > bottom_row:
-        return True
-    middle = column_of(x0 + x1, y0 + y1, view.heading, width)
-    reach = (q + (0.5 * np.pi - 1) * q * q * q + ATAN_ERROR) * width / (2 * np.pi) + 1e-6
-    first, last = np.ceil(middle - reach), np.floor(middle + reach)
-    shift = np.floor(first / width) * width
-    first, last = np.int64(first - shift), np.int64(last - shift)
+def hidden(stack, k, view, keys):
+    """Whether each pixel in which box k of the stack may be seen shows something nearer."""
+    first, last = np.int64(stack[k, 1]), np.int64(stack[k, 2])
+    top_row, bottom_row = np.int64(stack[k, 3]), np.int64(stack[k, 4])
     if (last - first + 1) * (bottom_row - top_row + 1) > _MAX_LOOKUPS:  # its parts may be hidden
-        return (last < start) or (first >= stop and last < start + width)
-    nearest = key_of(1.000001 / near, 0) + (np.int64(1) << 32)
-    for around in (0, width):
-        for column in range(max(first, start + around), min(last, stop - 1 + around) + 1):
+        return False
+    nearest = key_of(1.000003 / stack[k, 5], 0) + (np.int64(1) << 32)
+    for around in (0, view.width):
+        for column in range(max(first, view.start + around), min(last, view.stop - 1 + around) + 1):
             for row in range(top_row, bottom_row + 1):
                 if keys[np.uintp(column - around), np.uintp(row)] <= nearest:
                     return False

@@ -35,9 +35,9 @@ from tussock.world.textures import WRAPS, product_table
 
 from .colour_kernels import PLAIN
 from .cores import core_count
+from .culling_kernels import LEAF
 from .eye import Eye
 from .poses import Poses, Views, poses_of_eye
-from .culling_kernels import LEAF
 from .scanline_kernels import draw_views
 from .triangle_tree import TriangleTree
 

@@ -10,7 +10,7 @@ import numpy as np
 from . import colour_kernels, culling_kernels
 from .colour_kernels import average, colour_rays, opaque, weights_along
 from .compile import compiled
-from .culling_kernels import ATAN_ERROR, LEAF, View, find_candidates, invisible, key_of, row_of
+from .culling_kernels import ATAN_ERROR, FAN, LEAF, MAX_STACK, View, find_candidates, hidden, key_of, push_parts, row_of
 
 _SPANS = 512  # spans that are collected before they are drawn
 
@@ -90,13 +90,6 @@ def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
             keys[j, r] = max(keys[j, r], key_of(base + slope * tangents[r], label))
 
 
-@compiled(inline="always")
-def _squared_distance(boxes, k, view):
-    """From the eye to the middle of box k, over the ground."""
-    dx, dy = 0.5 * (boxes[k, 0] + boxes[k, 3]) - view.x, 0.5 * (boxes[k, 1] + boxes[k, 4]) - view.y
-    return dx * dx + dy * dy
-
-
 @compiled(error_model="numpy", uses=(colour_kernels, culling_kernels))
 def _draw(triangles, directions, tangents, view, keys, lookup):
     """Draw all triangles. Boxes are visited from near to far, so that near ones hide far ones.
@@ -108,16 +101,15 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
     width, start, stop, leaves = view.width, view.start, view.stop, boxes.shape[0] // 2
     work, found = np.empty(9 * LEAF, np.float32), np.empty(LEAF, np.int64)
     pairs, spans = np.empty((2, _SPANS), np.int64), np.empty((6, _SPANS))
-    stack, size = np.ones(64, np.int64), 1  # boxes to visit, at first the box of all
+    parts, stack = np.empty(8 * FAN, np.float32), np.empty((MAX_STACK, 6))
+    stack[0], size = (1, 0, width - 1, 0, view.height - 1, 0), 1  # the box of all
     while size:
         size -= 1
-        box = stack[size]
-        if invisible(boxes, box, view, keys):
+        if hidden(stack, size, view, keys):
             continue
+        box = np.int64(stack[size, 0])
         if box < leaves:
-            nearer = np.int64(_squared_distance(boxes, 2 * box + 1, view) < _squared_distance(boxes, 2 * box, view))
-            stack[size], stack[size + 1] = 2 * box + 1 - nearer, 2 * box + nearer
-            size += 2
+            size = push_parts(boxes, box, view, parts, stack, size)
             continue
         begin = (box - leaves) * LEAF
         end, corners = min(begin + LEAF, len(labels)), blocks[box - leaves]

@@ -35,7 +35,7 @@ class TriangleTree:
         if len(starts):
             boxes[leaves : leaves + len(starts), :3] = np.minimum.reduceat(triangles.min(axis=1)[order], starts)
             boxes[leaves : leaves + len(starts), 3:] = np.maximum.reduceat(triangles.max(axis=1)[order], starts)
-        corners = np.zeros((len(starts) * leaf, 3, 3), dtype=np.float32)
+        corners = np.zeros((max(1, len(starts)) * leaf, 3, 3), dtype=np.float32)
         corners[: len(order)] = triangles[order]
         corners = np.ascontiguousarray(corners.reshape(-1, leaf, 3, 3).transpose(0, 3, 2, 1))
         while leaves > 1:
