@@ -79,11 +79,46 @@ def _crossing(start, start_tangent, end, end_tangent, at, pad):
     return (min(t, u), max(t, u)) if near <= far else (_INF, -_INF)
 
 
+@compiled(inline="always")
+def _in_float32(view):
+    """Columns of a turn, columns in one radian, column of azimuth 0, elevation of the upper edge, and rows in one radian."""
+    wide, per_rad = np.float32(view.width), np.float32(view.width / (2 * np.pi))
+    turned = np.float32(view.heading - 2 * np.pi * np.floor(view.heading / (2 * np.pi)))
+    middle = (_HALF_TURN + turned) * per_rad - np.float32(0.5)
+    return wide, per_rad, middle, np.float32(view.top), np.float32(view.rows_per_rad)
+
+
+@compiled(inline="always")
+def _turn_of(column, wide):
+    """What to take from a column (-width..2 width) so that it becomes 0..width."""
+    zero = np.float32(0)
+    return -wide if column < zero else (wide if column >= wide else zero)
+
+
+@compiled(inline="always")
+def _row_32(tangent, top, rows_per_rad):
+    """`row_of` in float32."""
+    return (top - _atan2_32(tangent, np.float32(1))) * rows_per_rad - np.float32(0.5)
+
+
+@compiled(error_model="numpy", inline="always")
+def _find_corners(corners, n, view, work):
+    """Write the columns (not wrapped) of the three corners of the triangles of a leaf, and then their tangents, into work."""
+    _, per_rad, middle, _, _ = _in_float32(view)
+    for k in range(3):
+        for i in range(n):  # without branches, so that it is vectorised
+            dx, dy = np.float32(corners[0, k, i] - view.x), np.float32(corners[1, k, i] - view.y)
+            work[k * LEAF + i] = middle - _atan2_32(dy, dx) * per_rad
+            work[(3 + k) * LEAF + i] = np.float32(corners[2, k, i] - view.z) / (np.sqrt(dx * dx + dy * dy) + _TINY)
+
+
 @compiled(error_model="numpy")
 def find_candidates(corners, n, view, work, found):
     """Find the triangles of a leaf that a ray may meet: all that one does meet, and few others.
 
-    The least and greatest tangent of an edge that spans an angle s are those of its ends, times at most 1 / cos(s / 2) away from 0.
+    Along an edge, t over the azimuth is a sine, t'' = -t. So over an angle s it is within (1 / cos(s / 2) - 1) max |t| of the straight
+    line between its ends, which is less than 0.15 s^2 max |t| for s < 1. Most triangles are in one column: its rays meet the triangle
+    between the least and the greatest t at which edges cross it. For others the least and the greatest t of the corners must do.
 
     Args:
         corners: (3, 3, LEAF) see `TriangleTree`.
@@ -95,34 +130,19 @@ def find_candidates(corners, n, view, work, found):
     Returns:
         How many were found.
     """
-    one, zero, width, start, stop = (
-        np.float32(1),
-        np.float32(0),
-        view.width,
-        np.float32(view.start),
-        np.float32(view.stop),
-    )
-    x, y, z = view.x, view.y, view.z
-    heading = np.float32(view.heading - 2 * np.pi * np.floor(view.heading / (2 * np.pi)))
-    wide, turns, per_rad = np.float32(width), np.float32(1 / width), np.float32(width / (2 * np.pi))
-    pad = _ERROR_32 * per_rad + np.float32(1e-5)
-    half, middle = np.float32(0.5) * wide - pad, (_HALF_TURN + heading) * per_rad - np.float32(0.5)
-    top, rows_per_rad, bottom_row = np.float32(view.top), np.float32(view.rows_per_rad), np.float32(view.height - 1)
-    row_pad = _ERROR_32 * rows_per_rad + np.float32(1e-5)
-    for k in range(3):
-        for i in range(n):  # without branches, so that it is vectorised
-            dx, dy = np.float32(corners[0, k, i] - x), np.float32(corners[1, k, i] - y)
-            work[k * LEAF + i] = middle - _atan2_32(dy, dx) * per_rad
-            work[(3 + k) * LEAF + i] = np.float32(corners[2, k, i] - z) / (np.sqrt(dx * dx + dy * dy) + _TINY)
-    for i in range(n):  # likewise
-        ca, cb, cc = work[i], work[1 * LEAF + i], work[2 * LEAF + i]
+    zero, one, start, stop = np.float32(0), np.float32(1), np.float32(view.start), np.float32(view.stop)
+    wide, per_rad, _, top, rows_per_rad = _in_float32(view)
+    turns, bottom_row = np.float32(1 / view.width), np.float32(view.height - 1)
+    pad, row_pad = _ERROR_32 * per_rad + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
+    half = np.float32(0.5) * wide - pad
+    _find_corners(corners, n, view, work)
+    for i in range(n):  # without branches, so that it is vectorised
+        ca, cb, cc = work[i], work[LEAF + i], work[2 * LEAF + i]
         ab, bc, ac = cb - ca, cc - cb, cc - ca
-        ab -= wide * np.rint(ab * turns)
-        bc -= wide * np.rint(bc * turns)
-        ac -= wide * np.rint(ac * turns)
+        ab, bc, ac = ab - wide * np.rint(ab * turns), bc - wide * np.rint(bc * turns), ac - wide * np.rint(ac * turns)
         least, most = min(zero, min(ab, ac)), max(zero, max(ab, ac))
         first, last = np.ceil(ca + least - pad), np.floor(ca + most + pad)
-        shift = np.floor(first * turns + np.float32(1e-6)) * wide
+        turn = _turn_of(first, wide)
         # A triangle above or below the eye, or nearly so, is in every column.
         around = (abs(ab) > half) | (abs(bc) > half) | (abs(ac) > half) | (abs(ab + bc - ac) > np.float32(0.5))
         ta, tb, tc = work[3 * LEAF + i], work[4 * LEAF + i], work[5 * LEAF + i]
@@ -136,10 +156,10 @@ def find_candidates(corners, n, view, work, found):
         alone = first == last
         low = (min(low_ab, min(low_bc, low_ca)) if alone else low) - slack
         high = (max(high_ab, max(high_bc, high_ca)) if alone else high) + slack
-        top_row = np.ceil((top - _atan2_32(high, one)) * rows_per_rad - np.float32(0.5) - row_pad)
-        last_row = np.floor((top - _atan2_32(low, one)) * rows_per_rad - np.float32(0.5) + row_pad)
+        top_row = np.ceil(_row_32(high, top, rows_per_rad) - row_pad)
+        last_row = np.floor(_row_32(low, top, rows_per_rad) + row_pad)
         between = ((top_row > last_row) | (top_row > bottom_row) | (last_row < zero)) & (not around)
-        first, last = (zero if around else first - shift), (wide - one if around else last - shift)
+        first, last = (zero if around else first - turn), (wide - one if around else last - turn)
         work[6 * LEAF + i], work[7 * LEAF + i] = first, last
         outside = (first > last) | ((first >= stop) & (last < start + wide)) | (last < start)
         work[8 * LEAF + i] = zero if between | outside else one
@@ -167,12 +187,9 @@ def find_boxes(boxes, begin, n, view, work):
             the first and the last row, the distance of the nearest point (m) and the square of that of the middle (m^2), over the
             ground, and 1 where a pixel is left, else 0.
     """
-    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
-    x, y, z, wide, bottom = view.x, view.y, view.z, np.float32(view.width), np.float32(view.height - 1)
-    start, stop, per_rad = np.float32(view.start), np.float32(view.stop), np.float32(view.width / (2 * np.pi))
-    heading = np.float32(view.heading - 2 * np.pi * np.floor(view.heading / (2 * np.pi)))
-    turns, middle = np.float32(1 / view.width), (_HALF_TURN + heading) * per_rad - half
-    top, rows_per_rad = np.float32(view.top), np.float32(view.rows_per_rad)
+    zero, one, start, stop = np.float32(0), np.float32(1), np.float32(view.start), np.float32(view.stop)
+    x, y, z, bottom = view.x, view.y, view.z, np.float32(view.height - 1)
+    wide, per_rad, middle, top, rows_per_rad = _in_float32(view)
     pad, row_pad = _ERROR_32 + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
     for i in range(n):  # without branches, so that it is vectorised
         k = begin + i
@@ -185,13 +202,13 @@ def find_boxes(boxes, begin, n, view, work):
         q = np.sqrt((dx * dx + dy * dy) / (away + _TINY)) * _MORE
         around = (near <= zero) | (q >= one)
         low, high = z0 / ((near if z0 < zero else far) + _TINY), z1 / ((near if z1 > zero else far) + _TINY)
-        first_row = np.ceil((top - _atan2_32(high, one)) * rows_per_rad - half - row_pad)
-        last_row = np.floor((top - _atan2_32(low, one)) * rows_per_rad - half + row_pad)
+        first_row = np.ceil(_row_32(high, top, rows_per_rad) - row_pad)
+        last_row = np.floor(_row_32(low, top, rows_per_rad) + row_pad)
         first_row, last_row = (zero if around else max(first_row, zero)), (bottom if around else min(last_row, bottom))
         column, reach = middle - _atan2_32(sy, sx) * per_rad, (q + _BULGE * q * q * q + pad) * per_rad
         first, last = np.ceil(column - reach), np.floor(column + reach)
-        shift = np.floor(first * turns + np.float32(1e-6)) * wide
-        first, last = (zero if around else first - shift), (wide - one if around else last - shift)
+        turn = _turn_of(first, wide)
+        first, last = (zero if around else first - turn), (wide - one if around else last - turn)
         outside = (first > last) | ((first >= stop) & (last < start + wide)) | (last < start)
         work[i], work[FAN + i], work[2 * FAN + i], work[3 * FAN + i] = first, last, first_row, last_row
         work[4 * FAN + i], work[5 * FAN + i] = near, away

@@ -10,6 +10,8 @@ import trimesh
 from renderer_laws import batches_and_threads_do_not_matter, low_resolution_is_the_mean_over_each_pixels_solid_angle
 from scenes import random_poses, random_world, world_of
 
+from tussock.render import culling_kernels
+from tussock.render.culling_kernels import View, find_candidates
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.render.scanline import ScanlineRenderer
@@ -221,3 +223,30 @@ def test_no_ray_passes_between_two_triangles_at_an_upright_seam():
     for corners in (wall, wall[:, ::-1], wall * [1, 1, -1]):
         with open_renderer(world_of(corners, [[9, 9, 9]] * 2, ground=False), eye, "cpu") as opened:
             assert (opened.render([(0.0, 0.0, 0.0)])[0, :, 22, 3] == 255).all()
+
+
+@pytest.mark.parametrize("size", [(360, 75), (7, 400), (4000, 12)])
+@pytest.mark.parametrize("scale", [0.02, 0.3, 5.0])
+def test_no_triangle_that_a_ray_meets_is_left_out(size, scale):
+    """All rays against all triangles of many leaves, in double precision; a third has its corners on a grid on which the eye is."""
+    rng, (width, height), n = np.random.default_rng(8), size, culling_kernels.LEAF
+    work, found, met = np.empty(9 * n, np.float32), np.empty(n, np.int64), 0
+    for k in range(60):
+        corners = (rng.uniform(-2, 2, (n, 1, 3)) + scale * rng.normal(size=(n, 3, 3))) * [1, 1, 0.5]
+        corners = np.float32(np.round(4 * corners) / 4 if k % 3 == 0 else corners)
+        view = View(0.25, -0.5, 0.0, rng.uniform(-20, 20), 1.0, height / 1.5, width, height, 0, width)
+        count = find_candidates(np.ascontiguousarray(corners.transpose(2, 1, 0)), n, view, work, found)
+        azimuths = view.heading + column_azimuths(width)
+        tangents = np.tan(view.top - (np.arange(height) + 0.5) / view.rows_per_rad)
+        a, b, c = (corners.astype(float) - [view.x, view.y, view.z]).transpose(1, 0, 2)
+        volume = (a * np.cross(b, c)).sum(axis=1)
+        for i in np.flatnonzero(abs(volume) > 1e-12):
+            normals = np.cross([a[i], b[i], c[i]], [b[i], c[i], a[i]]) * np.sign(volume[i])
+            flat = normals[:, :1] * np.cos(azimuths) + normals[:, 1:2] * np.sin(azimuths)
+            hit = (flat[:, None] + normals[:, 2, None, None] * tangents[:, None] > 0).all(axis=0).any(axis=0)
+            if hit.any():
+                assert i in found[:count]
+                seen = np.arange(int(work[6 * n + i]), int(work[7 * n + i]) + 1) % width
+                assert set(np.flatnonzero(hit)) <= set(seen)
+                met += 1
+    assert met > 20
