@@ -55,7 +55,7 @@ def row_of(tangent, view):
     return (view.top - _atan2(tangent, 1.0)) * view.rows_per_rad - 0.5
 
 
-@compiled(error_model="numpy", inline="always")
+@compiled(error_model="numpy")
 def _atan2_32(y, x):
     """`_atan2` in float32, within _ERROR_32 (rad)."""
     ax, ay, zero = abs(x), abs(y), np.float32(0)
@@ -68,7 +68,7 @@ def _atan2_32(y, x):
     return -angle if y < zero else angle
 
 
-@compiled(error_model="numpy", inline="always")
+@compiled(error_model="numpy")
 def _crossing(start, start_tangent, end, end_tangent, at, pad):
     """The least and greatest tangent of an edge within pad of a column; inf and -inf where it does not get there."""
     length, zero, one = end - start, np.float32(0), np.float32(1)
@@ -79,7 +79,7 @@ def _crossing(start, start_tangent, end, end_tangent, at, pad):
     return (min(t, u), max(t, u)) if near <= far else (_INF, -_INF)
 
 
-@compiled(inline="always")
+@compiled
 def _in_float32(view):
     """Columns of a turn, columns in one radian, column of azimuth 0, elevation of the upper edge, and rows in one radian."""
     wide, per_rad = np.float32(view.width), np.float32(view.width / (2 * np.pi))
@@ -88,20 +88,20 @@ def _in_float32(view):
     return wide, per_rad, middle, np.float32(view.top), np.float32(view.rows_per_rad)
 
 
-@compiled(inline="always")
+@compiled
 def _turn_of(column, wide):
     """What to take from a column (-width..2 width) so that it becomes 0..width."""
     zero = np.float32(0)
     return -wide if column < zero else (wide if column >= wide else zero)
 
 
-@compiled(inline="always")
+@compiled
 def _row_32(tangent, top, rows_per_rad):
     """`row_of` in float32."""
     return (top - _atan2_32(tangent, np.float32(1))) * rows_per_rad - np.float32(0.5)
 
 
-@compiled(error_model="numpy", inline="always")
+@compiled(error_model="numpy")
 def _find_corners(corners, n, view, work):
     """Write the columns (not wrapped) of the three corners of the triangles of a leaf, and then their tangents, into work."""
     _, per_rad, middle, _, _ = _in_float32(view)
