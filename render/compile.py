@@ -3,7 +3,7 @@
 import hashlib
 import inspect
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from types import ModuleType
 from typing import Any
@@ -14,7 +14,7 @@ from numba.core import event
 log = logging.getLogger(__name__)
 
 
-def compiled(function: Callable | None = None, *, uses: ModuleType | None = None, **options: Any) -> Any:
+def compiled(function: Callable | None = None, *, uses: Sequence[ModuleType] = (), **options: Any) -> Any:
     """Decorator for a function that numba compiles; other threads run while it works.
 
     The machine code is kept on disk for later processes: next to the source, or in the user's folder for caches where the installation
@@ -23,15 +23,16 @@ def compiled(function: Callable | None = None, *, uses: ModuleType | None = None
 
     Args:
         function: The function, where the decorator is used without options.
-        uses: Another module whose functions it calls, or the functions that it calls do. numba notices a change in the source of a
-            function's own module only; with this it compiles anew after a change in the other one, too.
+        uses: Other modules whose functions it calls, or the functions that it calls do. numba notices a change in the source of a
+            function's own module only; with this it compiles anew after a change in the other ones, too.
         options: Further options of `numba.njit`.
     """
     if function is None:
         return partial(compiled, uses=uses, **options)
     bare: Any = inspect.unwrap(function)  # numba compiles the function itself, not a type checker around it
-    if uses is not None:  # what numba keeps is found by this name
-        bare.__qualname__ += "_" + hashlib.sha256(inspect.getsource(uses).encode()).hexdigest()[:12]
+    if uses:  # what numba keeps is found by this name
+        sources = "".join(map(inspect.getsource, uses))
+        bare.__qualname__ += "_" + hashlib.sha256(sources.encode()).hexdigest()[:12]
     try:
         dispatcher = numba.njit(bare, nogil=True, cache=True, **options)
     except RuntimeError:  # numba found no folder for its cache

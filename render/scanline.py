@@ -45,7 +45,7 @@ class Triangles(NamedTuple):
     """What the loops draw.
 
     Attributes:
-        corners: (3, 3, n) x, y, z (m) of the three corners of each triangle, see `TriangleTree`.
+        corners: (leaves, 3, 3, LEAF) x, y, z (m) of the three corners of each triangle, see `TriangleTree`.
         labels: (n,) a number over 0 for each triangle; of equally near ones, the one with the greatest label is seen.
         boxes: (m, 6) see `TriangleTree`.
         cull: Whether triangles are seen from their front only.

@@ -8,7 +8,7 @@ from jaxtyping import Float, Float32, Int64, UInt64
 
 from tussock.world.scene import World
 
-from .scanline_kernels import LEAF
+from .culling_kernels import LEAF
 
 COARSE = 256  # boxes from which a search begins: to test all of them takes no longer than one
 
@@ -18,31 +18,33 @@ class TriangleTree:
     """A binary tree without pointers: box 1 is the box of all, and box k contains boxes 2 k and 2 k + 1.
 
     The last half of the boxes are the leaves. Box `len(boxes) // 2 + i` contains the triangles i leaf to (i + 1) leaf - 1. A
-    triangle takes about 47 bytes.
+    triangle takes about 47 bytes. The corners of a leaf are together in memory: to read them costs more than to compute with them.
 
     Attributes:
         leaf: Triangles in a leaf.
         order: Index of each triangle in the world.
-        corners: x, y, z of the three corners of each triangle (m).
+        corners: x, y, z of the three corners of each triangle of each leaf (m); 0 where the last leaf has fewer.
         boxes: Least x, y, z and greatest x, y, z (m); inf and -inf where a box is empty.
     """
 
     leaf: int
     order: Int64[np.ndarray, " n"]
-    corners: Float32[np.ndarray, "3 3 n"]
+    corners: Float32[np.ndarray, "leaves 3 3 leaf"]
     boxes: Float32[np.ndarray, "m 6"]
 
     @classmethod
     def of(cls, triangles: Float32[np.ndarray, "n 3 3"], leaf: int) -> "TriangleTree":
         """The tree of some triangles, with `leaf` neighbours along a Z-curve over the ground in each leaf."""
         order = np.argsort(_z_curve(triangles[:, :, :2].mean(axis=1, dtype=float)), kind="stable")
-        corners = np.ascontiguousarray(triangles[order].transpose(2, 1, 0))
         starts = np.arange(0, len(order), leaf)
         leaves = 1 << max(0, len(starts) - 1).bit_length()
         boxes = np.tile(np.repeat(np.array([np.inf, -np.inf], dtype=np.float32), 3), (2 * leaves, 1))
         if len(starts):
-            boxes[leaves : leaves + len(starts), :3] = np.minimum.reduceat(corners.min(axis=1), starts, axis=1).T
-            boxes[leaves : leaves + len(starts), 3:] = np.maximum.reduceat(corners.max(axis=1), starts, axis=1).T
+            boxes[leaves : leaves + len(starts), :3] = np.minimum.reduceat(triangles.min(axis=1)[order], starts)
+            boxes[leaves : leaves + len(starts), 3:] = np.maximum.reduceat(triangles.max(axis=1)[order], starts)
+        corners = np.zeros((max(1, len(starts)) * leaf, 3, 3), dtype=np.float32)
+        corners[: len(order)] = triangles[order]
+        corners = np.ascontiguousarray(corners.reshape(-1, leaf, 3, 3).transpose(0, 3, 2, 1))
         while leaves > 1:
             below = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
             leaves //= 2
@@ -70,8 +72,8 @@ class TriangleTree:
             which, found = np.tile(which, 2), np.concatenate([2 * found, 2 * found + 1])
         places = ((found - leaves)[:, None] * self.leaf + np.arange(self.leaf)).ravel()
         which, places = np.repeat(which, self.leaf)[places < len(self.order)], places[places < len(self.order)]
-        corners = self.corners[:, :, places]
-        close = ((corners.min(axis=1) < high[which].T) & (corners.max(axis=1) > low[which].T)).all(axis=0)
+        corners = self.corners[places // self.leaf, :, :, places % self.leaf]
+        close = ((corners.min(axis=2) < high[which]) & (corners.max(axis=2) > low[which])).all(axis=1)
         which, found = which[close], self.order[places[close]]
         ascending = np.lexsort((found, which))
         return which[ascending], found[ascending]

@@ -72,8 +72,8 @@ def package_without_cache(tmp_path) -> Path:
 
 
 COMPILE = """
-from tussock.render.scanline_kernels import _key
-print(_key(1.0, 7), _key.stats.cache_path)
+from tussock.render.culling_kernels import key_of
+print(key_of(1.0, 7), key_of.stats.cache_path)
 """
 
 
@@ -94,7 +94,7 @@ from tussock.render.compile import compiled
 def plain(x):
     return used.double(x)
 
-caller = compiled(plain, uses=used)
+caller = compiled(plain, uses=[used])
 print(caller(3))
 """
 

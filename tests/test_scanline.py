@@ -10,6 +10,8 @@ import trimesh
 from renderer_laws import batches_and_threads_do_not_matter, low_resolution_is_the_mean_over_each_pixels_solid_angle
 from scenes import random_poses, random_world, world_of
 
+from tussock.render import culling_kernels
+from tussock.render.culling_kernels import View, find_candidates
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.render.scanline import ScanlineRenderer
@@ -198,11 +200,12 @@ def test_every_box_of_the_tree_contains_its_triangles_and_its_parts():
     triangles, _ = world.surfaces()
     tree = TriangleTree.of(triangles, 8)
     assert sorted(tree.order) == list(range(len(triangles)))
-    assert np.array_equal(tree.corners, triangles[tree.order].transpose(2, 1, 0))
+    corners = tree.corners.transpose(0, 3, 2, 1).reshape(-1, 3, 3)
+    assert np.array_equal(corners[: len(triangles)], triangles[tree.order])
     leaves = len(tree.boxes) // 2
     for k, (*low, x1, y1, z1) in enumerate(tree.boxes):
         if k >= leaves:
-            inside = tree.corners[..., (k - leaves) * 8 : (k - leaves + 1) * 8].reshape(3, -1)
+            inside = corners[: len(triangles)][(k - leaves) * 8 : (k - leaves + 1) * 8].reshape(-1, 3).T
         elif k >= 1:
             inside = np.hstack([tree.boxes[2 * k : 2 * k + 2, :3].T, tree.boxes[2 * k : 2 * k + 2, 3:].T])
             inside = inside[:, np.isfinite(inside).all(axis=0)]
@@ -220,3 +223,30 @@ def test_no_ray_passes_between_two_triangles_at_an_upright_seam():
     for corners in (wall, wall[:, ::-1], wall * [1, 1, -1]):
         with open_renderer(world_of(corners, [[9, 9, 9]] * 2, ground=False), eye, "cpu") as opened:
             assert (opened.render([(0.0, 0.0, 0.0)])[0, :, 22, 3] == 255).all()
+
+
+@pytest.mark.parametrize("size", [(360, 75), (7, 400), (4000, 12)])
+@pytest.mark.parametrize("scale", [0.02, 0.3, 5.0])
+def test_no_triangle_that_a_ray_meets_is_left_out(size, scale):
+    """All rays against all triangles of many leaves, in double precision; a third has its corners on a grid on which the eye is."""
+    rng, (width, height), n = np.random.default_rng(8), size, culling_kernels.LEAF
+    work, found, met = np.empty(9 * n, np.float32), np.empty(n, np.int64), 0
+    for k in range(60):
+        corners = (rng.uniform(-2, 2, (n, 1, 3)) + scale * rng.normal(size=(n, 3, 3))) * [1, 1, 0.5]
+        corners = np.float32(np.round(4 * corners) / 4 if k % 3 == 0 else corners)
+        view = View(0.25, -0.5, 0.0, rng.uniform(-20, 20), 1.0, height / 1.5, width, height, 0, width)
+        count = find_candidates(np.ascontiguousarray(corners.transpose(2, 1, 0)), n, view, work, found)
+        azimuths = view.heading + column_azimuths(width)
+        tangents = np.tan(view.top - (np.arange(height) + 0.5) / view.rows_per_rad)
+        a, b, c = (corners.astype(float) - [view.x, view.y, view.z]).transpose(1, 0, 2)
+        volume = (a * np.cross(b, c)).sum(axis=1)
+        for i in np.flatnonzero(abs(volume) > 1e-12):
+            normals = np.cross([a[i], b[i], c[i]], [b[i], c[i], a[i]]) * np.sign(volume[i])
+            flat = normals[:, :1] * np.cos(azimuths) + normals[:, 1:2] * np.sin(azimuths)
+            hit = (flat[:, None] + normals[:, 2, None, None] * tangents[:, None] > 0).all(axis=0).any(axis=0)
+            if hit.any():
+                assert i in found[:count]
+                seen = np.arange(int(work[6 * n + i]), int(work[7 * n + i]) + 1) % width
+                assert set(np.flatnonzero(hit)) <= set(seen)
+                met += 1
+    assert met > 20
