@@ -7,6 +7,7 @@ sum. They are linear in `d`, so within a column of rays (`d = (cos az, sin az, t
 
 import numpy as np
 
+from . import culling_kernels
 from .compile import compiled
 
 PLAIN = -2  # in `Lookup.index`: a triangle of one colour
@@ -136,7 +137,7 @@ def _ray_colour(uv, corner_colours, texels, textures, products, label, k, weight
     return red | green << 16 | blue << 32 | np.int64(255) << 48
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", uses=(culling_kernels,))  # of which `view` is
 def colour_rays(lookup, colours, directions, tangents, view, keys):
     """Replace the keys of columns view.start..view.stop-1 by the colours of their rays, packed as `colours` are."""
     corners, index, _, uv, corner_colours, texels, textures, _, products = lookup
