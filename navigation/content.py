@@ -6,6 +6,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from tussock.world.errors import FileError
+
 
 def label_of(source: Any, kind: str) -> str:
     """How settings name a world or a route. kind: what it is."""
@@ -29,8 +31,11 @@ def content_of(source: Any) -> str:
 
 
 def _digest_of(path: Path) -> str:
-    status = path.stat()
-    return _file_digest(path, status.st_size, status.st_mtime_ns)
+    try:
+        status = path.stat()
+        return _file_digest(path, status.st_size, status.st_mtime_ns)
+    except OSError as error:
+        raise FileError(f"{path} cannot be read ({error.strerror}); check that it is there") from error
 
 
 @lru_cache(maxsize=1024)  # every run of a sweep names the same few files

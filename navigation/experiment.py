@@ -204,7 +204,7 @@ class Experiment(Surroundings):
             navigator=navigator,
             model=trained,
             poses=poses,
-            views=None if images is None else shared_views(model, images),
+            views=images if images is None or trained is None else shared_views(model, images),
             seconds=time.perf_counter() - began,
         )
 

@@ -1,5 +1,6 @@
 """Why a walk failed: what is measured at its poor and failed steps, and the cause that follows (docs/failures.md)."""
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -45,7 +46,8 @@ FAR = 2 * CATCHMENT  # m; catchments whose centres are farther apart do not touc
 REVERSE = np.pi - POOR  # a heading more than this off the route's leads back along it
 CHORD = 0.3  # m; how much the route turns is measured from so far before to so far after
 CORNER_ANGLE = POOR  # where a route turns more than this, a view learned a little before or after gives a poor heading
-TOGETHER = 16  # steps that are examined together
+TOGETHER = 16  # steps that are examined together ..
+AHEAD_S = 0.25  # s; .. unless they take longer than this
 RECOVERY = 0.5  # m; an agent that gets this much farther along the route without a poor step is out of trouble
 
 
@@ -152,7 +154,7 @@ class Diagnostics:
     def along(self, walk: Iterator[list[Step | None]]) -> Iterator[list[tuple[Step, Diagnosis | None] | None]]:
         """A walk with diagnoses: each time, a list with the step of each agent and what is measured there, or None if its walk has ended.
 
-        The walk is up to TOGETHER looks ahead, because what is measured at many steps together takes a fraction of the time.
+        The walk is up to TOGETHER steps ahead, or those of AHEAD_S, because what is measured at many together takes a fraction of the time.
 
         Args:
             walk: The steps of agents side by side, as `Walk.steps` gives them.
@@ -161,13 +163,14 @@ class Diagnostics:
         while not ended:
             moments: list[list[Step | None]] = []
             try:
+                began = time.monotonic()
                 for steps in walk:
                     moments.append(steps)
-                    if sum(map(len, moments)) >= TOGETHER:
+                    if sum(map(len, moments)) >= TOGETHER or time.monotonic() - began > AHEAD_S:
                         break
                 else:
                     ended = True
-            except (Exception, KeyboardInterrupt):  # what was walked before is not lost
+            except BaseException:  # what was walked before is not lost
                 yield from self._examined(moments)
                 raise
             yield from self._examined(moments)

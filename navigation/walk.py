@@ -87,7 +87,7 @@ class Walk:
     """Agents that follow one route side by side.
 
     What they see is drawn, encoded and compared together, which takes a fraction of the time; each takes the steps that it takes
-    alone (but for rounding, where the model keeps no views).
+    alone.
     """
 
     def __init__(

@@ -3,6 +3,7 @@
 import csv
 import json
 import logging
+import pickle
 import shutil
 import time
 from collections import OrderedDict
@@ -132,6 +133,13 @@ class Slow(OrderedDict):
     def __setitem__(self, row, image):
         super().__setitem__(row, image)
         time.sleep(1e-4)
+
+
+def test_views_go_to_another_process(drawn):
+    with open_views(*drawn[:2]) as views:
+        before = views.render(views.poses[:5])
+        sent = pickle.loads(pickle.dumps(views))
+        assert np.array_equal(sent.render(views.poses[:5]), before)
 
 
 def test_threads_share_a_source_of_views(drawn, monkeypatch):

@@ -11,7 +11,7 @@ import scipy.io
 import trimesh
 
 from tussock.navigation.cli.main import main
-from tussock.world.errors import InputError, SettingError
+from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.files import write_world
 from tussock.world.geometry import Route
 from tussock.world.route_columns import column_of
@@ -435,3 +435,9 @@ def test_names_of_columns(name, axis, factor, bearing):
     else:
         assert column is not None
         assert (column.axis, column.factor, column.bearing) == (axis, factor, bearing)
+
+
+def test_names_in_a_comment_without_rows_are_no_route(tmp_path):
+    (tmp_path / "empty.csv").write_text("# x_m,y_m,heading_deg\n")
+    with pytest.raises(FileError):
+        read_route(tmp_path / "empty.csv")

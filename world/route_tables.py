@@ -140,7 +140,9 @@ def _named(lines: list[str], used: list[int], comments: list[int]) -> tuple[int,
     for number in [*used[:1], *comments[-1:], *used[1:MAX_PREAMBLE]]:
         for separator in SEPARATORS:
             names = split_line(_bare(lines[number]), separator)
-            if _has_xy(names) and (number in used or len(names) == len(split_line(lines[used[0]], separator))):
+            if _has_xy(names) and (
+                number in used or not used or len(names) == len(split_line(lines[used[0]], separator))
+            ):
                 return number, separator
     return None
 

@@ -1,10 +1,11 @@
 """Entering familiarity models: those with a name by it, any other from Python."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import InputError, SettingError
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import MODEL_SUFFIX, Experiment
@@ -50,14 +51,25 @@ def enter_named(
         check_free(out, benchmark, entry, chain)
     sweeps = {entry: benchmark.sweep(entry, encoding) for entry in entries}
     runs = [run for sweep in sweeps.values() for run in sweep.experiments]
-    run_sweep(Sweep(benchmark.name, {"model": entries}, runs), out, workers=workers, progress=progress)
+    try:
+        run_sweep(Sweep(benchmark.name, {"model": entries}, runs), out, workers=workers, progress=progress)
+    except InputError:
+        with suppress(InputError):  # what ended the sweep matters more
+            _results(sweeps, out, benchmark, chain)  # of the entries that are complete
+        raise
+    return _results(sweeps, out, benchmark, chain)
+
+
+def _results(sweeps: Mapping[str, Sweep], out: Path, benchmark: Benchmark, chain: str) -> list[tuple[Result, Path]]:
+    """Write the results of those entries of which all runs are finished."""
     with Store(out, read_only=True) as store:
         kept = store.rows()
     results = []
     for entry, sweep in sweeps.items():
-        rows = [kept[key_of(run)] for run in sweep.experiments]
-        result = result_of(benchmark, entry, chain, sweep.experiments, rows)
-        results.append((result, write_result(result, out, benchmark)))
+        rows = [kept[key] for run in sweep.experiments if (key := key_of(run)) in kept]
+        if len(rows) == len(sweep):
+            result = result_of(benchmark, entry, chain, sweep.experiments, rows)
+            results.append((result, write_result(result, out, benchmark)))
     return results
 
 

@@ -49,7 +49,7 @@ class BenchmarkCommand(WorkerOptions):
 
         benchmark = QUICK if self.quick else BENCHMARK
         names = list(MODELS.builtin) if self.model == "all" else split_list(self.model or "")
-        message(f"{len(names)} models, each {len(benchmark)} runs of {benchmark.name}")
+        message(f"{', '.join(dict.fromkeys(names))}: {len(benchmark)} runs of {benchmark.name} each")
         with progress("walking", "runs", verbose=True) as report:
             entered = enter_named(
                 names, self.out, encoding=self.encoding, benchmark=benchmark, workers=workers, progress=report

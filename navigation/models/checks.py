@@ -54,7 +54,8 @@ def check_values(views: Images, partial: bool = False) -> None:
     if views.dtype != torch.float32:
         raise SettingError(f"views are float32, got {views.dtype}; give views.float()")
     if not all_bounded(views, partial):
-        bad = int((views.abs() <= MAX_VALUE).flatten(start_dim=1).all(dim=1).int().argmin())
+        valid = (views.abs() <= MAX_VALUE) | (views.isnan() & partial)
+        bad = int(valid.flatten(start_dim=1).all(dim=1).int().argmin())
         raise SettingError(f"view {bad} holds values that are not finite, or over {MAX_VALUE:g}; check the encoding")
 
 

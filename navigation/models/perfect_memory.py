@@ -142,7 +142,8 @@ class PerfectMemory(IncrementalModel):
 
     def _nearest_known(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """The same over what a view and each snapshot both show."""
-        blocks = [each.squared(views).min(dim=2) for each in self._overlaps]
+        each_view = views.split(1)  # so that its bytes do not depend on the others
+        blocks = [torch.cat([each.squared(view) for view in each_view]).min(dim=2) for each in self._overlaps]
         squared, which = torch.stack([each.values for each in blocks]).min(dim=0)
         indices = torch.stack([each.indices + k * BLOCK for k, each in enumerate(blocks)])
         compared = squared.isfinite()

@@ -94,8 +94,6 @@ class Recording:
         self._new.append((step, diagnosis))
         if self._is_due() or len(self._new) == BATCH:
             self._hand_over(flush=self._is_due())
-        if self._is_due():
-            self._writing.result()
 
     def close(self) -> None:
         """Write what is left and close the file. Raises DiskFullError where it cannot be written."""

@@ -121,7 +121,7 @@ def _draw_world(axes: Axes, world: World) -> None:
     above_ground = triangles[..., 2].max(axis=1) - np.nan_to_num(world.ground_height(triangles[..., :2].mean(axis=1)))
     order = above_ground.argsort(kind="stable")  # lower ones first, so that higher ones cover them
     surfaces = PolyCollection(
-        triangles[order, :, :2],  # as an array, which is taken as a whole
+        triangles[order, :, :2],  # type: ignore[arg-type]  # an array is taken as a whole
         facecolors=rgb[order] / 255,
         edgecolors="none",
         antialiased=False,

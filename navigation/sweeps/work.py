@@ -102,7 +102,11 @@ def walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[W
     except Exception as error:
         if len(experiments) > 1:  # one of them is in the way of the others
             return [result for each in experiments for result in walk([each], trained)]
-        return [error if isinstance(error, InputError) else RuntimeError(first_line(error))]
+        if isinstance(error, InputError):
+            return [error]
+        told = RuntimeError(first_line(error))
+        told.__cause__ = error  # lost on the way from a worker, which need not know how to send it
+        return [told]
 
 
 def _walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[Walked | Exception]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int64, UInt8
@@ -115,6 +116,13 @@ class DatabaseViews:
         self._kept: OrderedDict[int, UInt8[np.ndarray, "height width channels"]] | None = OrderedDict()
         self._lock = Lock()  # of the images kept; threads may share a renderer
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What goes to another process: everything but the images kept."""
+        return vars(self) | {"_lock": None, "_kept": None if self._kept is None else OrderedDict()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _lock=Lock())
+
     def nearest(self, poses: Poses) -> tuple[Int64[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """The row in `self.poses` of the entry that is nearest to each pose, and how far away it is (m)."""
         return self._entries.nearest(as_poses(poses))
@@ -166,7 +174,12 @@ class DatabaseViews:
                 row, first = int(self._entries.rows[part[0]]), int(np.searchsorted(self._entries.owners, owner))
                 passed = database.passed(row, limit=int(SHARE_PASSED * CACHE_BYTES / self._view_bytes))
                 part = np.array([first + each for each in passed if first + each not in self._kept])
-            for row, image in zip(part.tolist(), database.views(self._entries.rows[part].tolist()), strict=True):
+            try:
+                views = database.views(self._entries.rows[part].tolist())
+            except FileError:  # a frame that is passed may be damaged
+                part = np.intersect1d(part, missing)
+                views = database.views(self._entries.rows[part].tolist())
+            for row, image in zip(part.tolist(), views, strict=True):
                 if image.shape[2] < self._channels:
                     raise FileError(
                         f"{database.folder}: some of its images have alpha and others none; give images of one kind"
