@@ -94,6 +94,8 @@ class Recording:
         self._new.append((step, diagnosis))
         if self._is_due() or len(self._new) == BATCH:
             self._hand_over(flush=self._is_due())
+        if self._is_due():  # where FLUSH_SECONDS is 0, each step is on disk before the next
+            self._writing.result()
 
     def close(self) -> None:
         """Write what is left and close the file. Raises DiskFullError where it cannot be written."""
