@@ -64,7 +64,11 @@ def measure(command: Sequence[str], folder: Path, environment: Mapping[str, str]
 
 
 def _reap(pid: int) -> int | None:
-    """Wait for children that have ended; the exit code of one of them, or, for 0, 0 if there are no more. None while it goes on."""
+    """Wait for children that have ended.
+
+    Returns:
+        The exit code of the process `pid`, once it has ended; for a `pid` of 0, 0 once no child is left. None before.
+    """
     with suppress(ChildProcessError):
         while True:
             ended, status = os.waitpid(-1, os.WNOHANG)

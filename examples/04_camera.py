@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 
 from tussock import Encoding, Look, PerfectMemory, Scan
-from tussock.render.images.unwrapping import Ring, Unwrapping
+from tussock.render.images.lenses import Ring
+from tussock.render.images.unwrapping import Unwrapping
 
 
 def frames(source):

@@ -85,11 +85,9 @@ class Encoding:
 
     def for_eye(self, eye: Eye) -> "EyeEncoding":
         """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
-        visible, known = (
-            eye.visible() if eye.masked or eye.known is not None else np.ones((1, 1), dtype=bool),
-            eye.known,
-        )
-        if visible.all() and known is None:
+        known = eye.known
+        visible = eye.visible() if eye.masked or known is not None else None
+        if visible is None or (visible.all() and known is None):
             return EyeEncoding(self, None)
         at = next((place for place, step in enumerate(self.steps) if isinstance(step, Normalise)), len(self.steps))
         local, rest = self.steps[:at], self.steps[at + 1 :]

@@ -137,7 +137,7 @@ def _ray_colour(uv, corner_colours, texels, textures, products, label, k, weight
     return red | green << 16 | blue << 32 | np.int64(255) << 48
 
 
-@compiled(error_model="numpy", uses=(culling_kernels,))  # of which `view` is
+@compiled(error_model="numpy", uses=(culling_kernels,))  # `view` is a type of that module
 def colour_rays(lookup, colours, directions, tangents, view, keys):
     """Replace the keys of columns view.start..view.stop-1 by the colours of their rays, packed as `colours` are."""
     corners, index, _, uv, corner_colours, texels, textures, _, products = lookup

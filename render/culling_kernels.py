@@ -163,10 +163,16 @@ def find_candidates(corners, n, view, work, found):
         work[6 * LEAF + i], work[7 * LEAF + i] = first, last
         outside = (first > last) | ((first >= stop) & (last < start + wide)) | (last < start)
         work[8 * LEAF + i] = zero if between | outside else one
+    return _marked(work[8 * LEAF :], n, found)
+
+
+@compiled
+def _marked(marks, n, found):
+    """Write the indices of the marks that are 1, not 0, into found; how many they are."""
     count = 0
     for i in range(n):
         found[count] = i
-        count += np.int64(work[8 * LEAF + i])
+        count += np.int64(marks[i])
     return count
 
 

@@ -1,12 +1,11 @@
 """The triangles of a world, sorted in space under a tree of boxes, so that a renderer can leave out many of them at once."""
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float, Float32, Int64, UInt64
 
-from tussock.world.scene import World
+from tussock.world.scene import World, once_per_world
 
 from .culling_kernels import LEAF
 
@@ -79,14 +78,10 @@ class TriangleTree:
         return which[ascending], found[ascending]
 
 
-_trees: WeakKeyDictionary[World, TriangleTree] = WeakKeyDictionary()
-
-
+@once_per_world
 def tree_of(world: World) -> TriangleTree:
-    """The tree of the surfaces of a world. It is made when it is first needed, and kept as long as the world."""
-    if world not in _trees:
-        _trees[world] = TriangleTree.of(world.surfaces()[0], LEAF)
-    return _trees[world]
+    """The tree of the surfaces of a world."""
+    return TriangleTree.of(world.surfaces()[0], LEAF)
 
 
 def _z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:

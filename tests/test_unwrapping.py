@@ -16,9 +16,10 @@ from tussock.navigation.cli.main import main
 from tussock.render.eye import Eye
 from tussock.render.images.calibration import read_calibration
 from tussock.render.images.camera import Camera
+from tussock.render.images.lenses import Fisheye, Omnidirectional, Panorama, PanoramaPart, Ring
 from tussock.render.images.pictures import read_image
 from tussock.render.images.ring_search import find_ring
-from tussock.render.images.unwrapping import Fisheye, Omnidirectional, Panorama, PanoramaPart, Ring, Unwrapping
+from tussock.render.images.unwrapping import Unwrapping
 from tussock.world.errors import FileError, InputError, SettingError
 
 TOP, BOTTOM = np.radians(40), np.radians(-20)

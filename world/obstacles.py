@@ -1,37 +1,18 @@
 """Obstacles: what the triangles of a world cover on the ground, between the heights that an insect walks over and walks under."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
-from typing import TypeVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
-from .scene import World
+from .scene import World, once_per_world
 from .terrain import STEP_HEIGHT, Terrain
-
-Made = TypeVar("Made")
 
 BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
 MIN_LEVEL = -4  # shapes within 2 ** -4 m of their middle are of one size
 SLACK = 1e-6  # m; more than the rounding of any distance
 BATCH = 500  # positions at once, which bounds the memory of the shapes near them
-
-
-def once_per_world(make: Callable[[World], Made]) -> Callable[[World], Made]:
-    """A function of a world whose result is kept as long as the world, which never changes."""
-    kept: WeakKeyDictionary[World, Made] = WeakKeyDictionary()
-
-    @wraps(make)
-    def get(world: World) -> Made:
-        if world not in kept:
-            kept[world] = make(world)
-        return kept[world]
-
-    return get
 
 
 def clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:

@@ -26,16 +26,8 @@ CELL = 0.02  # m, of the grid of clearances
 MARGIN = 20  # cells around the field, so that obstacles just outside it count
 NODE_SPACING = 3  # cells between the nodes through which paths are planned
 NODE_CELL = NODE_SPACING * CELL  # m
-TO_NEIGHBOURS = (
-    (0, 1),
-    (1, 0),
-    (1, 1),
-    (1, -1),
-    (1, 2),
-    (2, 1),
-    (1, -2),
-    (2, -1),
-)  # rows and columns of nodes; and back
+# Rows and columns of nodes to each neighbour; as many are in the opposite directions.
+TO_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1))
 
 Window = tuple[int, int, int, int]  # of nodes: rows from, rows to, columns from, columns to
 # Numbers of the nodes that edges go from and to, and costs.
@@ -81,7 +73,7 @@ class Paths:
     def xy(self, nodes: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
         """Positions of nodes (m)."""
         rows, columns = np.divmod(nodes, self.shape[1])
-        return np.column_stack([columns, rows]) * NODE_SPACING * CELL + self.corner
+        return np.column_stack([columns, rows]) * NODE_CELL + self.corner
 
     def nearest(self, xy: Float[np.ndarray, "2"]) -> int:
         """The node nearest to a position (m)."""
@@ -198,7 +190,7 @@ def _edges(grid: Float[np.ndarray, "rows columns"]) -> Edges:
         nodes = np.flatnonzero(free)
         here.append(nodes)
         there.append(nodes + down * free.shape[1] + right)
-        length = NODE_SPACING * CELL * np.hypot(down, right)
+        length = NODE_CELL * np.hypot(down, right)
         cost.append(length * (1 + (PREFERRED_CLEARANCE / narrowest[free]) ** 2))
     return np.concatenate(here), np.concatenate(there), np.concatenate(cost)
 

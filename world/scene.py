@@ -1,8 +1,11 @@
 """The world: coloured triangles, a ground and a sky."""
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
@@ -14,6 +17,8 @@ from .params import WORLDS, WorldParams, preset_of
 from .settings import MAX_COORDINATE, RGB
 from .terrain import MAX_SLOPE, Terrain
 from .textures import Texturing
+
+Made = TypeVar("Made")
 
 
 def check_colour(label: str, value: Any) -> None:
@@ -158,3 +163,16 @@ class World:
         triangles = np.array([(a, b, c), (a, c, d)], dtype=np.float32)
         rgb = np.array([self.ground.rgb] * 2, dtype=np.uint8)
         return np.concatenate([self.triangles, triangles]), np.concatenate([self.rgb, rgb])
+
+
+def once_per_world(make: Callable[[World], Made]) -> Callable[[World], Made]:
+    """A function of a world whose result is kept as long as the world, which never changes."""
+    kept: WeakKeyDictionary[World, Made] = WeakKeyDictionary()
+
+    @wraps(make)
+    def get(world: World) -> Made:
+        if world not in kept:
+            kept[world] = make(world)
+        return kept[world]
+
+    return get

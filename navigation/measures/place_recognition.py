@@ -57,7 +57,7 @@ def recognise(
     """Match queries with references, and count what is right.
 
     Args:
-        difference: Image difference of each query from each reference; inf where they are not compared, which is no match.
+        difference: Image difference of each query from each reference; inf where they are not compared: never a match.
         queries: Where the query views were taken (m).
         references: Where the reference views were taken (m).
         tolerance: Greatest distance of a correct match (m).

@@ -5,7 +5,7 @@
 - width: the width of the valley around the minimum at half its depth, interpolated between neighbours. None where the curve does not
   rise so far on both sides.
 
-Differences that are not compared are inf (see `differences`); they are no part of the curve.
+Differences that are not compared are inf (see `differences`); they are left out of the curve.
 """
 
 from dataclasses import dataclass

@@ -58,12 +58,12 @@ class FilterBank:
 
     def appended(self, filters: Float32[torch.Tensor, "m h w"]) -> "FilterBank":
         """These filters and then others, without biases; this object stays as it is."""
-        grown = copy.copy(self)
+        combined = copy.copy(self)
         if self._mask is not None:
             filters = filters.double() * self._mask.visible.to(filters.device)
-            grown._sums = torch.cat([self._sums, filters.sum(dim=(1, 2))])
-        grown._spectra = self._spectra.appended(filters)
-        return grown
+            combined._sums = torch.cat([self._sums, filters.sum(dim=(1, 2))])
+        combined._spectra = self._spectra.appended(filters)
+        return combined
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
         """Response of each filter to each rotation of each view."""
@@ -116,9 +116,9 @@ class Rotations:
     def appended(self: Bank, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> Bank:
         """These filters and then others, all with biases; this object stays as it is."""
         assert self._biases is not None
-        grown = copy.copy(self)
-        grown._spectra, grown._biases = self._spectra.appended(filters), torch.cat([self._biases, biases])
-        return grown
+        combined = copy.copy(self)
+        combined._spectra, combined._biases = self._spectra.appended(filters), torch.cat([self._biases, biases])
+        return combined
 
     def responses(
         self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)

@@ -37,7 +37,7 @@ class Growing:
 
     @property
     def storage(self) -> torch.Tensor:
-        """The whole storage, whose layout does not depend on the length; behind the length, its numbers mean nothing."""
+        """The whole storage: its layout does not depend on the length. Numbers after the length have no meaning."""
         return self._storage.tensor
 
     def appended(self, more: torch.Tensor) -> "Growing":
@@ -50,8 +50,8 @@ class Growing:
             shape[self._dim] = max(total, 2 * self._length)
             storage = _Storage(storage.tensor.new_zeros(shape), self._length)
             storage.tensor.narrow(self._dim, 0, self._length).copy_(self.tensor)
-        grown = object.__new__(Growing)
-        grown._dim, grown._length, grown._storage = self._dim, total, storage
+        combined = object.__new__(Growing)
+        combined._dim, combined._length, combined._storage = self._dim, total, storage
         storage.tensor.narrow(self._dim, self._length, more.shape[self._dim]).copy_(more)
         storage.taken = total
-        return grown
+        return combined

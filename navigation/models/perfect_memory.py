@@ -67,11 +67,11 @@ class PerfectMemory(IncrementalModel):
     def _learn_more(self, shape: tuple[int, int], views: Images) -> None:
         """Only what is new is transformed and stored; snapshots that others hold stay as they are."""
         self._check_form(shape, self._learned)
-        grown, seen = copy.copy(self), self._seen(views)
-        grown._memory = self._memory.appended(seen)
-        grown._learned = {"snapshots": grown._memory.tensor}
-        grown._compare(seen)
-        vars(self).update(vars(grown))
+        combined, seen = copy.copy(self), self._seen(views)
+        combined._memory = self._memory.appended(seen)
+        combined._learned = {"snapshots": combined._memory.tensor}
+        combined._compare(seen)
+        vars(self).update(vars(combined))
 
     def _prepare(self) -> None:
         self._memory = Growing(self.snapshots)

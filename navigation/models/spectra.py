@@ -41,10 +41,10 @@ class Spectra:
 
     def appended(self, filters: Float[torch.Tensor, "m h w"]) -> "Spectra":
         """These filters and then others; this object stays as it is."""
-        grown = copy.copy(self)
-        grown._blocks = list(self._blocks)
-        grown._add(filters)
-        return grown
+        combined = copy.copy(self)
+        combined._blocks = list(self._blocks)
+        combined._add(filters)
+        return combined
 
     def _add(self, filters: Float[torch.Tensor, "m h w"]) -> None:
         space = self.size - len(self._blocks[-1]) if self._blocks else 0
@@ -91,7 +91,7 @@ def _rows(spectra: torch.Tensor) -> Float[torch.Tensor, "f n parts"]:
 
 
 def _columns(spectra: torch.Tensor) -> Float[torch.Tensor, "f parts m"]:
-    """The same for filters, (m, h, f), with one of them a column. Much faster in two steps, of which the first is a plain transposition."""
+    """The same for filters (m, h, f), each of which becomes a column. In two steps, as a plain transposition is much faster."""
     parts = torch.view_as_real(spectra)  # (m, h, f, 2)
     transposed = parts.flatten(1).T.contiguous().unflatten(0, parts.shape[1:]).transpose(0, 1)  # (f, h, 2, m)
     return torch.nn.functional.pad(transposed.flatten(1, 2), (0, 0, 0, -2 * parts.shape[1] % TERMS))

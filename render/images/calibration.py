@@ -8,8 +8,8 @@ from typing import Any
 
 from tussock.world.errors import FileError, SettingError
 
+from .lenses import Fisheye, Omnidirectional
 from .metadata import read_storage
-from .unwrapping import Fisheye, Omnidirectional
 
 log = logging.getLogger(__name__)
 

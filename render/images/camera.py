@@ -13,9 +13,10 @@ from tussock.world.settings import choice, number, settings, switch, whole
 
 from .calibration import read_calibration
 from .lens_metadata import MAX_COLUMNS, MIN_ASPECT, natural_size
+from .lenses import LOOKING, MAX_PIXEL, MAX_SIZE, Fisheye, Omnidirectional, Panorama, PanoramaPart, Ring
 from .pictures import Picture
 from .ring_search import find_ring
-from .unwrapping import LOOKING, MAX_PIXEL, MAX_SIZE, Fisheye, Omnidirectional, Panorama, PanoramaPart, Ring, Unwrapping
+from .unwrapping import Unwrapping
 
 log = logging.getLogger(__name__)
 
@@ -28,8 +29,8 @@ class Camera:
     """How panoramas are made of pictures. What is None is found out, stated by a calibration, or taken as usual.
 
     Attributes:
-        lens: What the pictures are. auto: a ring where its centre or a radius is given; else panoramas where they are at least twice as
-            wide as high, rings otherwise.
+        lens: What the pictures are. auto: rings where a centre, a radius or `flip` is given, and panoramas where a field is; else
+            panoramas where they are at least twice as wide as high, rings otherwise.
         calibration: File of OpenCV's with K and D of a fisheye lens, or xi, K and D of an omnidirectional one.
         looking: What the middle of the picture of a calibrated lens shows.
         centre: x and y of a ring (pixels).
@@ -66,11 +67,11 @@ class Camera:
             raise FieldError(
                 "Camera", "", f"a {self.lens} lens needs a calibration; give the file of OpenCV's with K and D"
             )
-        if self.field is not None and self.lens not in ("auto", "panorama"):
+        if self.field is not None and self.stated_lens != "panorama":
             raise FieldError(
                 "Camera",
                 "",
-                f"a field is of pictures that are a part of a panorama, not of a lens {self.lens!r}; leave it out",
+                f"a field is of pictures that are a part of a panorama, not of a lens {self.stated_lens!r}; leave it out",
             )
         if self.calibration is not None and self.lens not in ("fisheye", "omnidirectional"):
             raise FieldError(
@@ -78,12 +79,24 @@ class Camera:
                 "",
                 f"a calibration is of a fisheye or omnidirectional lens, not of {self.lens!r}; give that lens",
             )
-
-        ring = [name for name in ("centre", "inner", "outer", "flip") if getattr(self, name) not in (None, False)]
-        if ring and self.lens not in ("auto", "ring"):
+        if self._of_a_ring and self.stated_lens != "ring":
             raise FieldError(
-                "Camera", "", f"{', '.join(ring)} of a ring, and the lens is {self.lens!r}; leave out one of them"
+                "Camera",
+                "",
+                f"{', '.join(self._of_a_ring)} of a ring, and the lens is {self.lens!r}; leave out one of them",
             )
+
+    @property
+    def _of_a_ring(self) -> list[str]:
+        """What is given that only rings have."""
+        return [name for name in ("centre", "inner", "outer", "flip") if getattr(self, name) not in (None, False)]
+
+    @property
+    def stated_lens(self) -> str:
+        """The lens that is given, or that follows from what is given; "auto" where none does."""
+        if self.lens == "auto" and self._of_a_ring:
+            return "ring"
+        return "panorama" if self.lens == "auto" and self.field is not None else self.lens
 
     def unwrapping(self, pictures: Sequence[Picture]) -> Unwrapping:
         """How the pictures of this camera become panoramas. What is assumed is logged.
@@ -95,11 +108,7 @@ class Camera:
             InputError: There is no ring in them, or what was given does not fit together.
         """
         height, width = pictures[0].shape[:2]
-        lens = self.lens
-        if lens == "auto" and not (self.centre is None and self.inner is None and self.outer is None):
-            lens = "ring"
-        if lens == "auto" and self.field is not None:
-            lens = "panorama"
+        lens = self.stated_lens
         if lens == "auto":
             lens = "panorama" if width >= MIN_ASPECT * height else "ring"
             log.warning("the pictures are %d x %d: each is taken as a %s; --lens takes another", width, height, lens)

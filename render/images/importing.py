@@ -173,8 +173,7 @@ def _unwrapping(origin: dict[str, Any], path: Path, camera: Camera, pictures: li
         pictures: Some of the pictures.
     """
     height, width = pictures[0].shape[:2]
-    given = camera.lens != "auto" or any(each is not None for each in (camera.centre, camera.inner, camera.outer))
-    if not given and unwrapper_in(origin) and needs_unwrapping(origin, height, width):
+    if camera.stated_lens == "auto" and unwrapper_in(origin) and needs_unwrapping(origin, height, width):
         return stated_unwrapping(origin, height, width, path)
     eye = group_in(origin, "tussock", "eye")
     edges = {edge: eye.get(edge) for edge in ("top", "bottom") if getattr(camera, edge) is None}

@@ -10,8 +10,9 @@ from typing import Any
 
 from tussock.world.errors import FileError, SettingError
 
+from .lenses import Ring
 from .metadata import group_in
-from .unwrapping import Ring, Unwrapping
+from .unwrapping import Unwrapping
 
 MIN_ASPECT = 2.0  # width by height from which a picture of a panoramic camera is taken to be unwrapped already
 MAX_COLUMNS = 720  # of a panorama whose size is not stated, as in the published Sussex databases

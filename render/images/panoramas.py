@@ -10,10 +10,11 @@ from tussock.world.progress import Progress, no_progress
 
 from .camera import Camera
 from .database import check_new, make_folder
+from .lenses import Ring
 from .pictures import SUFFIXES, Picture, check_content, encoded
 from .ring_search import draw_ring
 from .sources import Reference, frames_of, is_video_file, picture_names, read_panoramas, sample, sampled
-from .unwrapping import Ring, Unwrapping
+from .unwrapping import Unwrapping
 
 log = logging.getLogger(__name__)
 

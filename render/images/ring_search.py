@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float
 
 from tussock.world.errors import FileError
 
+from .lenses import Ring
 from .pictures import Picture
-from .unwrapping import Ring
 
 CORNER = 0.04  # side of the squares in the corners that show the surround, as a share of the picture's shorter side
 MIN_CONTRAST = (
