@@ -199,8 +199,8 @@ def find_boxes(boxes, begin, n, view, work):
     pad, row_pad = _ERROR_32 + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
     for i in range(n):  # without branches, so that it is vectorised
         k = begin + i
-        x0, y0, z0 = np.float32(boxes[k, 0] - x), np.float32(boxes[k, 1] - y), np.float32(boxes[k, 2] - z)
-        x1, y1, z1 = np.float32(boxes[k, 3] - x), np.float32(boxes[k, 4] - y), np.float32(boxes[k, 5] - z)
+        x0, y0, z0 = np.float32(boxes[0, k] - x), np.float32(boxes[1, k] - y), np.float32(boxes[2, k] - z)
+        x1, y1, z1 = np.float32(boxes[3, k] - x), np.float32(boxes[4, k] - y), np.float32(boxes[5, k] - z)
         nx, ny, fx, fy = max(zero, max(x0, -x1)), max(zero, max(y0, -y1)), max(-x0, x1), max(-y0, y1)
         near, far = np.sqrt(nx * nx + ny * ny), np.sqrt(fx * fx + fy * fy)
         dx, dy, sx, sy = x1 - x0, y1 - y0, x0 + x1, y0 + y1
@@ -235,7 +235,7 @@ def push_parts(boxes, box, view, work, stack, size):
         Boxes on the stack then.
     """
     begin, n = 2 * box, 2
-    while n < FAN and begin < len(boxes) // 2:  # parts of parts
+    while n < FAN and begin < boxes.shape[1] // 2:  # parts of parts
         begin, n = 2 * begin, 2 * n
     find_boxes(boxes, begin, n, view, work)
     bottom = size

@@ -47,7 +47,7 @@ class Triangles(NamedTuple):
     Attributes:
         corners: (leaves, 3, 3, LEAF) x, y, z (m) of the three corners of each triangle, see `TriangleTree`.
         labels: (n,) a number over 0 for each triangle; of equally near ones, the one with the greatest label is seen.
-        boxes: (m, 6) see `TriangleTree`.
+        boxes: (6, m) the boxes of a `TriangleTree`, one coordinate after the other, so that loops over them are vectorised.
         cull: Whether triangles are seen from their front only.
     """
 
@@ -172,7 +172,7 @@ class ScanlineRenderer:
         _, rgb = world.surfaces()
         tree = tree_of(world)
         labels = len(rgb) - tree.order  # of equally near triangles the first is seen
-        triangles = Triangles(tree.corners, labels, tree.boxes, not world.double_sided)
+        triangles = Triangles(tree.corners, labels, np.ascontiguousarray(tree.boxes.T), not world.double_sided)
         elevations = eye.elevations(eye.rays)
         rows_per_rad = len(elevations) / (eye.top - eye.bottom)
         azimuths = column_azimuths(eye.width * eye.rays)

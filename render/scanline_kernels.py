@@ -98,7 +98,7 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
     a column and a label (pairs), least and greatest tangent, base and slope of the inverse distance, and two rows to work in (spans).
     """
     blocks, labels, boxes, cull = triangles
-    width, start, stop, leaves = view.width, view.start, view.stop, boxes.shape[0] // 2
+    width, start, stop, leaves = view.width, view.start, view.stop, boxes.shape[1] // 2
     work, found = np.empty(9 * LEAF, np.float32), np.empty(LEAF, np.int64)
     pairs, spans = np.empty((2, _SPANS), np.int64), np.empty((6, _SPANS))
     parts, stack = np.empty(8 * FAN, np.float32), np.empty((MAX_STACK, 6))
