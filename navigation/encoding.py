@@ -34,7 +34,7 @@ PRESETS = {
     "edges": "foreground-mask | {blur}vertical-edges | {resize}normalise",
 }
 FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
-BATCH = 4  # views that are encoded at once: they stay in the processor's cache through all steps
+BATCH_PIXELS = 108_000  # of views that are encoded at once: they stay in the processor's cache through all steps
 
 
 @attrs.frozen
@@ -65,7 +65,8 @@ class Encoding:
         """Feature images of views (n, height, width, 3 or 4) uint8."""
         if views.ndim != 4 or views.shape[-1] not in (3, 4) or views.dtype != np.uint8:
             raise SettingError(f"views are (n, height, width, 3 or 4) uint8, got {views.shape} {views.dtype}")
-        parts = [self._encode(views[start : start + BATCH]) for start in range(0, max(1, len(views)), BATCH)]
+        batch = max(1, BATCH_PIXELS // max(1, views.shape[1] * views.shape[2]))
+        parts = [self._encode(views[start : start + batch]) for start in range(0, max(1, len(views)), batch)]
         return torch.from_numpy(np.concatenate(parts))
 
     def _encode(self, views: Views) -> Images:

@@ -15,6 +15,8 @@ from jaxtyping import Bool, Float32, UInt8
 from tussock.world.errors import SettingError
 from tussock.world.settings import number
 
+from .block_means import block_means
+
 Views = UInt8[np.ndarray, "n height width channels"]
 Images = Float32[np.ndarray, "n h w"]
 Visible = Bool[np.ndarray, "_ _"]
@@ -137,7 +139,7 @@ class Resize(AveragingStep):
         if (h, w) == (height, width) or n == 0:
             return images[:, :h, :w]
         if height % h == 0 and width % w == 0:
-            return images.reshape(n, h, height // h, w, width // w).mean(axis=(2, 4), dtype=np.float32)
+            return block_means(images, height // h, width // w)
         return np.stack([cv2.resize(image, (w, h), interpolation=cv2.INTER_AREA) for image in images])
 
 

@@ -105,10 +105,11 @@ class Cubemap:
 
 
 def face_size_for(eye: Eye) -> int:
-    """Edge of a face (pixels) with which under 2 % of an eye's pixels are more than 8 grey levels off the exact ones.
+    """Edge of a face (pixels): five pixels for each ray of the eye, in the middle of a face.
 
-    Measured in generated worlds full of small leaves at 720 x 150: 2.8 % are off with faces of 512, 2.1 % with 768, 1.7 %
-    with 1024, 1.3 % with 1280; this gives 1152. In the Sussex world it is 0.6 % with 512. The time grows with the area.
+    At 720 x 150 that is 1152, with which under 2 % of the pixels are more than 8 grey levels off the exact ones, in generated worlds
+    full of small leaves, too (1.4 %; 1.7 % with 1024, 2.1 % with 768, 2.8 % with 512). Smaller eyes get smaller faces, and a
+    larger error: docs/performance.md has a table. The time grows with the area.
     """
     rays_per_radian = eye.rays * max(eye.width / (2 * np.pi), eye.height / (eye.top - eye.bottom))
     face_pixels_per_ray = 5.0  # in the middle of a face, where pixels are largest

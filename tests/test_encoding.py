@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import random_poses, random_world
 
+from tussock.navigation.block_means import block_means
 from tussock.navigation.encoding import PRESETS, Encoding
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
@@ -93,6 +94,20 @@ def test_resizing_averages_blocks():
         Encoding.parse("grey | resize 3")(image), whole.reshape(1, 4, 3, 8, 3).mean(axis=(2, 4)), atol=1e-6
     )
     assert Encoding.parse("grey | resize 7")(image).shape == (1, 2, 4)  # rounded, at least four columns
+
+
+@given(
+    count=st.integers(1, 3),
+    blocks=st.tuples(st.integers(1, 9), st.integers(4, 12)),
+    size=st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    margin=st.integers(0, 2),
+)
+def test_means_of_blocks_are_numpys_to_the_last_bit(count, blocks, size, margin):
+    shape = (count, blocks[0] * size[0], blocks[1] * size[1] + 2 * margin)
+    images = np.random.default_rng(sum(shape)).standard_normal(shape).astype(np.float32)
+    images = images[:, :, margin : shape[2] - margin]  # not contiguous, as after a blur
+    theirs = images.reshape(count, blocks[0], size[0], blocks[1], size[1]).mean(axis=(2, 4), dtype=np.float32)
+    assert block_means(images, *size).tobytes() == theirs.tobytes()
 
 
 def test_edges_are_what_a_loop_finds(views):
