@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int64, UInt64
+from jaxtyping import Float, Float32, Int64
 
 from tussock.world.scene import World, once_per_world
 
@@ -33,8 +33,8 @@ class TriangleTree:
 
     @classmethod
     def of(cls, triangles: Float32[np.ndarray, "n 3 3"], leaf: int) -> "TriangleTree":
-        """The tree of some triangles, with `leaf` neighbours along a Z-curve over the ground in each leaf."""
-        order = np.argsort(_z_curve(triangles[:, :, :2].mean(axis=1, dtype=float)), kind="stable")
+        """The tree of some triangles, with `leaf` neighbours in each leaf."""
+        order = _order(triangles.mean(axis=1, dtype=np.float32), leaf)
         starts = np.arange(0, len(order), leaf)
         leaves = 1 << max(0, len(starts) - 1).bit_length()
         boxes = np.tile(np.repeat(np.array([np.inf, -np.inf], dtype=np.float32), 3), (2 * leaves, 1))
@@ -84,12 +84,21 @@ def tree_of(world: World) -> TriangleTree:
     return TriangleTree.of(world.surfaces()[0], LEAF)
 
 
-def _z_curve(points: Float[np.ndarray, "n 2"]) -> UInt64[np.ndarray, " n"]:
-    """Position of points along a Z-curve: 16 bits of x and of y, interleaved."""
-    if len(points) == 0:
-        return np.empty(0, dtype=np.uint64)
-    low = points.min(axis=0)
-    cells = ((points - low) * (65535 / max(np.ptp(points, axis=0).max(), 1e-300))).astype(np.uint64)
-    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
-        cells = (cells | cells << np.uint64(shift)) & np.uint64(mask)
-    return cells[:, 0] | cells[:, 1] << np.uint64(1)
+def _order(points: Float32[np.ndarray, "n 3"], leaf: int) -> Int64[np.ndarray, " n"]:
+    """The points in an order in which each `leaf` of them are close together, as are each 2 `leaf`, 4 `leaf` and so on.
+
+    All are cut in two along the longest side of the box around them, then each part likewise; first parts are full.
+    """
+    n, order, places = len(points), np.arange(len(points)), points.T.copy()
+    size = leaf << max(0, -(-n // leaf) - 1).bit_length()
+    while size > leaf:
+        size //= 2
+        whole = n - n % (2 * size)
+        for begin, end, length in ((0, whole, 2 * size), (whole, n, n - whole)):
+            if begin < end and length > size:
+                parts = places[:, begin:end].reshape(3, -1, length)
+                longest = np.ptp(parts, axis=2).argmax(axis=0)
+                cut = np.argpartition(parts[longest, np.arange(len(longest))], size, axis=1)
+                places[:, begin:end] = np.take_along_axis(parts, cut[None], axis=2).reshape(3, -1)
+                order[begin:end] = np.take_along_axis(order[begin:end].reshape(-1, length), cut, axis=1).ravel()
+    return order
