@@ -28,8 +28,6 @@ from jaxtyping import Float, Float32, Float64, Int64
 from ..feature_mask import FeatureMask
 from .spectra import Spectra
 
-RESPONSES = 2**17  # that `Rotations` computes at once: they stay in the processor's cache
-
 Bank = TypeVar("Bank", bound="Rotations")
 
 
@@ -80,21 +78,14 @@ class FilterBank:
         if self._training is not None:  # products that torch can differentiate
             spectra, filters = torch.fft.rfft(views).permute(2, 0, 1), torch.fft.rfft(self._training).permute(2, 1, 0)
             return torch.fft.irfft(torch.bmm(spectra.conj(), filters), n=self._width, dim=0).movedim(0, 1)
-        responses = views.new_empty(len(views), len(self._spectra), self._width)
-        for view, filters, (real, imaginary) in self._spectra.products(views):
-            count = filters.stop - filters.start
-            for k in range(len(real)):
-                spectra = torch.complex(real[k, :, :count], imaginary[k, :, :count])
-                responses[view + k, filters] = torch.fft.irfft(spectra, n=self._width, dim=0).T
-        return responses.mT
+        responses = views.new_empty(len(views), self._width, len(self._spectra))
+        for some, filters, of_these in self._spectra.responses(views):
+            responses[some, :, filters] = of_these
+        return responses
 
 
 class Rotations:
-    """Responses of many filters to all rotations, one view after the other.
-
-    They are those of a `FilterBank`, found faster: products are real, and a response is split into what is even in the rotation (the
-    inverse transform of the real parts of R) and what is odd (that of the imaginary parts). As r[k] = even[k] + odd[k] and
-    r[-k] = even[k] - odd[k], half of the rotations need an inverse transform, as a product of matrices.
+    """Responses of many filters to all rotations, some views and filters after the other.
 
     Args:
         filters: (m, h, w)
@@ -102,16 +93,7 @@ class Rotations:
     """
 
     def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
-        width = filters.shape[2]
         self._spectra, self._biases = Spectra(filters), biases
-        count = width // 2 + 1
-        identity = torch.eye(count, dtype=torch.float64, device=filters.device)
-        self._even = torch.fft.irfft(identity, n=width, dim=0)[:count].float()
-        self._odd = torch.fft.irfft(1j * identity, n=width, dim=0)[:count].float()
-        self._right = slice(1, (width + 1) // 2)
-        # Rotations 0, 1, .. w // 2 come first, then as many to the right: where each rotation stands.
-        rotation = torch.arange(width, device=filters.device)
-        self.order = torch.where(rotation < count, rotation, count - 1 + width - rotation)
 
     def appended(self: Bank, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> Bank:
         """These filters and then others, all with biases; this object stays as it is."""
@@ -122,28 +104,9 @@ class Rotations:
 
     def responses(
         self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> Iterator[tuple[slice, int, Float32[torch.Tensor, "views w filters"]]]:
-        """Which views, the index of a filter, and the responses of this and the next filters to the views; for all views and filters.
-
-        The rotations are in an order of their own: `responses[:, order]` has them as a view turns.
-        """
-        width, count = views.shape[2], len(self._even)
-        for start, filters, (real, imaginary) in self._spectra.products(views, among):
-            m = filters.stop - filters.start
-            if self._biases is not None:  # frequency 0 adds to all rotations alike
-                real[:, 0, :m] += width * self._biases[filters]
-            size = max(1, RESPONSES // (width * m))
-            for part, (reals, imaginaries) in enumerate(zip(real.split(size), imaginary.split(size), strict=True)):
-                even, odd = torch.empty_like(reals), torch.empty_like(imaginaries)
-                for k in range(len(reals)):  # one by one, to the same bytes as alone
-                    torch.mm(self._even, reals[k], out=even[k])
-                    torch.mm(self._odd, imaginaries[k], out=odd[k])
-                even, odd = even[..., :m], odd[..., :m]
-                responses = torch.empty(len(even), width, m, device=views.device)
-                torch.add(even, odd, out=responses[:, :count])
-                torch.sub(even[:, self._right], odd[:, self._right], out=responses[:, count:])
-                view = start + part * size
-                yield slice(view, view + len(even)), filters.start, responses
+    ) -> Iterator[tuple[slice, slice, Float32[torch.Tensor, "views w filters"]]]:
+        """As `Spectra.responses`."""
+        return self._spectra.responses(views, self._biases, among)
 
 
 class NearestFilters(Rotations):
@@ -164,12 +127,12 @@ class NearestFilters(Rotations):
         n, width = len(views), views.shape[2]
         least = views.new_full((n, width), torch.inf)
         index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
-        for some, first, responses in self.responses(views, among):
+        for some, filters, responses in self.responses(views, among):
             values, which = _least(responses)
             less = values < least[some]
             least[some] = values.where(less, least[some])
-            index[some] = (first + which).where(less, index[some])
-        return least[:, self.order], index[:, self.order]
+            index[some] = (filters.start + which).where(less, index[some])
+        return least, index
 
 
 def _least(responses: Float32[torch.Tensor, "n w m"]) -> tuple[torch.Tensor, torch.Tensor]:

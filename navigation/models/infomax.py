@@ -111,7 +111,7 @@ class Infomax(IncrementalModel):
         activity = torch.zeros(len(views), views.shape[2], device=views.device)
         for some, _, inputs in self._rotations.responses(views):
             activity[some] += inputs.abs_().sum(dim=2)
-        return -activity[:, self._rotations.order]
+        return -activity
 
 
 def infomax_update(
