@@ -9,8 +9,8 @@ By the correlation theorem its Fourier transform along azimuth is, at each frequ
 
     R = sum over rows i of conj(V[i]) F[i]
 
-so all views meet all filters in one small product of matrices per frequency (`Spectra`). `FilterBank` is just this. `Rotations` gives
-the same, faster where filters are many, and `NearestFilters` finds the filter with the least response.
+so all views meet all filters in one small product of matrices per frequency (`Spectra`). `FilterBank` is just this, and
+`NearestFilters` finds the filter with the least response.
 
 A mask stands still with the eye: it is part of the filters (see `FeatureMask`), and what it hides makes no difference.
 
@@ -19,17 +19,12 @@ agree within 1e-6 sqrt(w) |V| |F| (rounding).
 """
 
 import copy
-from collections.abc import Iterator
-from typing import TypeVar
 
 import torch
 from jaxtyping import Float, Float32, Float64, Int64
 
 from ..feature_mask import FeatureMask
 from .spectra import Spectra
-
-Bank = TypeVar("Bank", bound="Rotations")
-
 
 class FilterBank:
     """Filters, ready to meet any number of views.
@@ -79,38 +74,27 @@ class FilterBank:
             spectra, filters = torch.fft.rfft(views).permute(2, 0, 1), torch.fft.rfft(self._training).permute(2, 1, 0)
             return torch.fft.irfft(torch.bmm(spectra.conj(), filters), n=self._width, dim=0).movedim(0, 1)
         responses = views.new_empty(len(views), self._width, len(self._spectra))
-        for some, filters, of_these in self._spectra.responses(views):
-            responses[some, :, filters] = of_these
+        for chunk in self._spectra.chunks(views):
+            responses[chunk.views, :, chunk.filters] = chunk.responses()
         return responses
 
 
-class Rotations:
-    """Responses of many filters to all rotations, some views and filters after the other.
+class NearestFilters:
+    """Finds the filter with the least response to each rotation of a view.
 
     Args:
         filters: (m, h, w)
-        biases: (m,) Added to the responses; None means none.
+        biases: (m,) Added to the responses.
     """
 
-    def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
+    def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]):
         self._spectra, self._biases = Spectra(filters), biases
 
-    def appended(self: Bank, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> Bank:
-        """These filters and then others, all with biases; this object stays as it is."""
-        assert self._biases is not None
+    def appended(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> "NearestFilters":
+        """These filters and then others; this object stays as it is."""
         combined = copy.copy(self)
         combined._spectra, combined._biases = self._spectra.appended(filters), torch.cat([self._biases, biases])
         return combined
-
-    def responses(
-        self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> Iterator[tuple[slice, slice, Float32[torch.Tensor, "views w filters"]]]:
-        """As `Spectra.responses`."""
-        return self._spectra.responses(views, self._biases, among)
-
-
-class NearestFilters(Rotations):
-    """Finds the filter with the least response to each rotation of a view."""
 
     def nearest(
         self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
@@ -127,16 +111,9 @@ class NearestFilters(Rotations):
         n, width = len(views), views.shape[2]
         least = views.new_full((n, width), torch.inf)
         index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
-        for some, filters, responses in self.responses(views, among):
-            values, which = _least(responses)
-            less = values < least[some]
-            least[some] = values.where(less, least[some])
-            index[some] = (filters.start + which).where(less, index[some])
+        for chunk in self._spectra.chunks(views, self._biases, among):
+            values, which = chunk.least()
+            less = values < least[chunk.views]
+            least[chunk.views] = values.where(less, least[chunk.views])
+            index[chunk.views] = which.where(less, index[chunk.views])
         return least, index
-
-
-def _least(responses: Float32[torch.Tensor, "n w m"]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Least response over the filters (n, w), and its index. On a CPU by numpy, whose argmin is faster than torch's."""
-    on_cpu = responses.device.type == "cpu"
-    index = torch.from_numpy(responses.numpy().argmin(axis=2)) if on_cpu else responses.argmin(dim=2)
-    return responses.gather(2, index[..., None])[..., 0], index

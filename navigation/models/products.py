@@ -1,4 +1,4 @@
-"""Products of small matrices, each sum in the order of its terms, and the responses that are made of them.
+"""Compiled loops: products of small matrices, the responses of filters that are made of them, and what becomes of these.
 
 A product of matrices by BLAS may depend, in its last bits, on how many rows there are: one view alone would be scanned to other bytes
 than among others. Here each number is summed by itself in one place of a register of the processor, term after term, whatever is
@@ -17,6 +17,7 @@ from tussock.render.compile import compiled
 TILE = 64  # filters that are stored together, and multiplied at once: what is computed on the way stays in the processor's cache
 REGISTER = 32  # bytes of one; those of AVX-512 are larger, but gain little (measured on an AMD EPYC 9004: 97 to 88 Gflop/s)
 COLUMNS = 2  # registers next to each other
+MAX = 2**31 - 1  # of a whole number of 32 bits
 
 
 def _sums(rows: int) -> Any:
@@ -86,49 +87,116 @@ _two_rows, _four_rows = _sums(2), _sums(4)
 
 
 @compiled
-def _multiply(left, right, column, sums):
-    """left (i, k) x right (k, j) as sums (i, TILE), of the columns from `column` on; i is even."""
+def _multiply(left, right, sums, at):
+    """left (i, k) x right (k, TILE), stored as columns `at` to `at` + TILE of sums; i is even."""
     rows = left.shape[0]
-    for start in range(0, TILE, COLUMNS * REGISTER // left.itemsize):
+    for column in range(0, TILE, COLUMNS * REGISTER // left.itemsize):
         for row in range(0, rows - rows % 4, 4):
-            _four_rows(left, row, right, column + start, sums, start)
+            _four_rows(left, row, right, column, sums, at + column)
         if rows % 4:
-            _two_rows(left, rows - 2, right, column + start, sums, start)
+            _two_rows(left, rows - 2, right, column, sums, at + column)
 
 
 @compiled
-def respond(rows, tiles, biases, even, odd, first, responses, begin, end):
-    """Responses (n, w, m) of some filters to n views at all rotations.
+def _of_tile(rows, tile, products):
+    """Products (2 n, f, TILE) of the filters of a tile (f, k, TILE) with n views: their real parts, then their imaginary parts."""
+    flat = products.reshape(len(products), products.shape[1] * TILE)
+    for f in range(len(rows)):
+        _multiply(rows[f], tile[f], flat, f * TILE)
 
-    Args:
-        rows: (f, 2 n, k) Of each view what gives the real parts of its products, then what gives the imaginary parts.
-        tiles: (t, f, k, TILE) Filters.
-        biases: (m,) Added to the responses.
-        even: (i, f) Transform of real parts to what is even in the rotation, for rotations 0 to w // 2; i is even.
-        odd: (i, f) The same of imaginary parts, to what is odd.
-        first: The filter of `responses[..., 0]`.
-        responses: (n, w, m) Stored here.
-        begin: The first tile to multiply.
-        end: The tile after the last one.
+
+@compiled
+def _turned(real, imaginary, inverse, parts, responses):
+    """Responses (w, TILE) to all rotations of a view, from its products (f, TILE).
+
+    r[k] = even[k] + odd[k] and r[-k] = even[k] - odd[k]: what is even in the rotation comes from the real parts, what is odd from the
+    imaginary parts. So half of the rotations need an inverse transform.
     """
-    n, width, m = responses.shape
-    products = np.empty((rows.shape[0], 2 * n, TILE), rows.dtype)
-    by_frequency = products.reshape(rows.shape[0], 2 * n * TILE)
-    evens, odds = np.empty((even.shape[0], TILE), rows.dtype), np.empty((odd.shape[0], TILE), rows.dtype)
+    _multiply(inverse[0], real, parts[0], 0)
+    _multiply(inverse[1], imaginary, parts[1], 0)
+    for k in range(len(responses) // 2 + 1):
+        even, odd, left, right = parts[0, k], parts[1, k], responses[k], responses[-k]
+        for j in range(TILE):
+            right[j] = even[j] - odd[j]
+            left[j] = even[j] + odd[j]  # where both are the same rotation, odd is 0
+
+
+@compiled
+def _scratch(rows, inverse, width):
+    """Arrays for what is computed on the way."""
+    frequencies, count, _ = rows.shape
+    products = np.empty((count, frequencies, TILE), rows.dtype)
+    parts = np.empty((2, inverse.shape[1], TILE), rows.dtype)
+    return products, parts, np.empty((width, TILE), rows.dtype)
+
+
+# In all of these, of n views and of the filters `first` to `first` + m of some tiles:
+#   rows (f, 2 n, k): of each view what gives the real parts of its products, then what gives the imaginary parts
+#   inverse (2, i, f): transforms of real and of imaginary parts to rotations 0 to w // 2; i is even
+#   tiles (t, f, k, TILE): filters; those in tiles `begin` to `end` are used
+#   biases (m,): added to the responses
+
+
+@compiled
+def respond(rows, inverse, tiles, biases, first, begin, end, responses):
+    """Store the responses (n, w, m)."""
+    products, parts, turned = _scratch(rows, inverse, responses.shape[1])
     for tile in range(begin, end):
-        for f in range(rows.shape[0]):
-            _multiply(rows[f], tiles[tile, f], 0, products[f])
-        start, stop = max(first - tile * TILE, 0), min(first + m - tile * TILE, TILE)
-        left = tile * TILE + start - first
-        right = left + stop - start
-        bias = biases[left:right]
-        for v in range(n):
-            _multiply(even, by_frequency, 2 * v * TILE, evens)
-            _multiply(odd, by_frequency, (2 * v + 1) * TILE, odds)
-            for k in range(width // 2 + 1):
-                a, b = evens[k, start:stop], odds[k, start:stop]
-                positive, negative = responses[v, k, left:right], responses[v, -k, left:right]
-                for j in range(stop - start):
-                    middle = a[j] + bias[j]
-                    negative[j] = middle - b[j]
-                    positive[j] = middle + b[j]  # where both are the same rotation, b is 0
+        _of_tile(rows, tiles[tile], products)
+        column = tile * TILE - first
+        start, stop = max(0, -column), min(TILE, len(biases) - column)
+        bias = biases[column + start : column + stop]
+        for v in range(len(responses)):
+            _turned(products[2 * v], products[2 * v + 1], inverse, parts, turned)
+            for k in range(len(turned)):
+                found, stored = turned[k, start:stop], responses[v, k, column + start : column + stop]
+                for j in range(len(bias)):
+                    stored[j] = found[j] + bias[j]
+
+
+@compiled
+def nearest(rows, inverse, tiles, biases, first, begin, end, least, index):
+    """Where a response is below `least` (n, w), change it to the least response, and `index` (n, w) to its filter, from 0 to m - 1.
+
+    Of a float32 and of its bits as a whole number the order is the same, but for those below 0; of whole numbers, several are compared
+    at once.
+    """
+    products, parts, turned = _scratch(rows, inverse, least.shape[1])
+    bits = turned.view(np.int32)
+    for tile in range(begin, end):
+        _of_tile(rows, tiles[tile], products)
+        column = tile * TILE - first
+        start, stop = max(0, -column), min(TILE, len(biases) - column)
+        bias = biases[column + start : column + stop]
+        for v in range(len(least)):
+            _turned(products[2 * v], products[2 * v + 1], inverse, parts, turned)
+            for k in range(len(turned)):
+                responses, ordered, low = turned[k, start:stop], bits[k, start:stop], np.int32(MAX)
+                for j in range(len(bias)):
+                    responses[j] += bias[j]
+                for j in range(len(bias)):
+                    low = min(low, ordered[j] ^ (ordered[j] >> 31 & MAX))
+                low ^= low >> 31 & MAX
+                if np.int32(low).view(np.float32) < least[v, k]:
+                    j = 0
+                    while ordered[j] != low:
+                        j += 1
+                    least[v, k], index[v, k] = responses[j], column + start + j
+
+
+@compiled(fastmath={"reassoc"})
+def absolute(rows, inverse, tiles, biases, first, begin, end, sums):
+    """Store the sums (t, n, w) of the absolute responses of each tile."""
+    products, parts, turned = _scratch(rows, inverse, sums.shape[2])
+    for tile in range(begin, end):
+        _of_tile(rows, tiles[tile], products)
+        column = tile * TILE - first
+        start, stop = max(0, -column), min(TILE, len(biases) - column)
+        bias = biases[column + start : column + stop]
+        for v in range(sums.shape[1]):
+            _turned(products[2 * v], products[2 * v + 1], inverse, parts, turned)
+            for k in range(len(turned)):
+                responses, total = turned[k, start:stop], np.float32(0)
+                for j in range(len(bias)):
+                    total += abs(responses[j] + bias[j])
+                sums[tile, v, k] = total

@@ -1,28 +1,25 @@
-"""Filters by their Fourier transforms along azimuth, and their responses to all rotations of views."""
+"""Filters by their Fourier transforms along azimuth, and what comes of their responses to all rotations of views."""
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float64
+from jaxtyping import Float, Float64, Int64
 
 from ..threads import in_threads
 from .growing import Tiles
-from .products import TILE, respond
+from .products import TILE, absolute, nearest, respond
 
 # Filters, and views, that are multiplied at once: what is computed on the way then stays in the processor's cache
 # (measured on an AMD EPYC with 1 MB of it per core).
-FILTERS, VIEWS = 1024, 16
+FILTERS, VIEWS = 960, 16
 SMALL = 2**23  # multiplications; below it, one thread is the quickest
 
 
 class Spectra:
     """Transforms of filters. Further ones can be added; this computes nothing of the others again.
-
-    A response is split into what is even in the rotation (the inverse transform of the real parts of the products) and what is odd
-    (that of the imaginary parts). As r[k] = even[k] + odd[k] and r[-k] = even[k] - odd[k], half of the rotations need an inverse
-    transform, as a product of matrices.
 
     Args:
         filters: (m, h, w) The first ones, float32 or float64.
@@ -30,7 +27,7 @@ class Spectra:
 
     def __init__(self, filters: Float[torch.Tensor, "m h w"]):
         self.width, self.size, self._blocks = filters.shape[2], FILTERS, []
-        self._even, self._odd = (each.to(filters) for each in _inverse(self.width))
+        self._inverse = inverse(self.width).to(filters)
         self._add(filters)
 
     def __len__(self) -> int:
@@ -49,76 +46,115 @@ class Spectra:
             self._blocks[-1] = self._blocks[-1].appended(torch.fft.rfft(filters[:space]))
         self._blocks += [Tiles(torch.fft.rfft(some)) for some in filters[space:].split(self.size) if len(some)]
 
-    def responses(
+    def chunks(
         self,
         views: Float[torch.Tensor, "n h w"],
         biases: Float[torch.Tensor, " m"] | None = None,
         among: slice = slice(None),
-    ) -> Iterator[tuple[slice, slice, Float[torch.Tensor, "views w filters"]]]:
-        """Which views, which filters, and the responses of these filters to all rotations of these views; some after the other.
-
-        What is yielded may be changed by the caller, and is overwritten when the next is asked for.
+    ) -> Iterator["Chunk"]:
+        """Some views and filters after the other, to compute what is wanted of their responses.
 
         Args:
             views: (n, h, w)
             biases: (m,) Added to the responses; None means none.
-            among: The filters to compare with.
+            among: The filters that respond.
         """
         rows = _rows(views)
         start, stop, _ = among.indices(len(self))
-        some = min(len(views), VIEWS), self.width, min(stop - start, self.size)
-        storage = views.new_empty(some).flatten()
         for begin, block in zip(range(0, stop, self.size), self._blocks, strict=False):
             first, last = max(start - begin, 0), min(stop - begin, len(block))
             if first >= last:
                 continue
             filters = slice(begin + first, begin + last)
-            bias = views.new_zeros(last - first) if biases is None else biases[filters]
+            added = views.new_zeros(last - first) if biases is None else biases[filters]
+            tiles = block.storage[first // TILE : -(-last // TILE)]
             for view in range(0, len(views), VIEWS):
-                of_views = rows[:, 2 * view : 2 * (view + VIEWS)].contiguous()
-                shape = of_views.shape[1] // 2, self.width, last - first
-                responses = storage[: shape[0] * shape[1] * shape[2]].view(shape)
-                self._respond(of_views, block.storage, bias, first, responses)
-                yield slice(view, view + len(responses)), filters, responses
-
-    def _respond(
-        self, rows: torch.Tensor, tiles: torch.Tensor, biases: torch.Tensor, first: int, responses: torch.Tensor
-    ) -> None:
-        """Store the responses (n, w, m) of filters of a block, from the `first` one on."""
-        if rows.device.type != "cpu":
-            return respond_on_device(rows, tiles, biases, self._even, self._odd, first, responses)
-        arrays = [each.numpy() for each in (rows, tiles, biases, self._even, self._odd)]
-        begin, end = first // TILE, -(-(first + responses.shape[2]) // TILE)
-        large = rows.numel() * TILE * (end - begin) >= SMALL
-        return in_threads(
-            lambda low, high: respond(*arrays, first, responses.numpy(), begin + low, begin + high),
-            end - begin,
-            torch.get_num_threads() if large else 1,
-        )
+                some = slice(view, min(view + VIEWS, len(views)))
+                of_views = rows[:, 2 * some.start : 2 * some.stop].contiguous()
+                yield Chunk(some, filters, of_views, self._inverse, tiles, added, first % TILE, self.width)
 
 
-def _inverse(width: int) -> tuple[Float64[torch.Tensor, "i f"], Float64[torch.Tensor, "i f"]]:
-    """What makes responses at rotations 0 to w // 2 of real parts, and of imaginary parts; with an even number of rows for `respond`."""
-    count = width // 2 + 1
-    identity = torch.eye(count, dtype=torch.float64)
-    halves = (torch.fft.irfft(parts, n=width, dim=0)[:count] for parts in (identity, 1j * identity))
-    even, odd = (torch.nn.functional.pad(half, (0, 0, 0, count % 2)).contiguous() for half in halves)
-    return even, odd
+@dataclass(frozen=True)
+class Chunk:
+    """Some views and filters whose products are computed at once.
 
+    Attributes:
+        views: Which views.
+        filters: Which filters.
+        rows: (f, 2 n, k) Of each view what gives the real parts of its products, then what gives the imaginary parts.
+        inverse: (2, i, f) As `inverse`.
+        tiles: (t, f, k, TILE) Transforms of the filters.
+        biases: (m,) Added to the responses.
+        first: Where the first of the filters is in the tiles.
+        width: Number of rotations.
+    """
 
-def respond_on_device(
-    rows: torch.Tensor, tiles: torch.Tensor, biases: torch.Tensor, even: torch.Tensor, odd: torch.Tensor,
-    first: int, responses: torch.Tensor,
-) -> None:
-    """`respond` for all tiles by torch, whose sums may be rounded differently in another batch."""
-    n, width, m = responses.shape
-    needed = tiles[first // TILE : -(-(first + m) // TILE)]
-    products = torch.matmul(rows, needed).movedim(0, 2).flatten(2)[..., first % TILE :][..., :m]  # (f, 2 n, m)
-    products = products.unflatten(1, (n, 2)).permute(2, 1, 0, 3)  # (2, n, f, m)
-    count = width // 2 + 1
-    middle, b = torch.matmul(even[:count], products[0]) + biases, torch.matmul(odd[:count], products[1])
-    responses[:, :count] = middle + b
-    responses[:, count:] = (middle - b)[:, 1 : (width + 1) // 2].flip(1)
+    views: slice
+    filters: slice
+    rows: torch.Tensor
+    inverse: torch.Tensor
+    tiles: torch.Tensor
+    biases: torch.Tensor
+    first: int
+    width: int
+
+    def responses(self) -> Float[torch.Tensor, "n w m"]:
+        """Responses of the filters to all rotations of the views."""
+        if not self._compiled:
+            return self.by_torch()
+        responses = self.rows.new_empty(*self._shape, len(self.biases))
+        self._in_threads(lambda *arguments: respond(*arguments, responses.numpy()))
+        return responses
+
+    def least(self) -> tuple[Float[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
+        """The least response to each rotation of the views, and the number of the filter among all filters that gives it."""
+        if not self._compiled:
+            least, index = self.by_torch().min(dim=2)
+            return least, self.filters.start + index
+        found = {}
+
+        def work(*arguments) -> None:
+            least, index = np.full(self._shape, np.inf, self.rows.numpy().dtype), np.zeros(self._shape, np.int64)
+            nearest(*arguments, least, index)
+            found[arguments[-2]] = torch.from_numpy(least), torch.from_numpy(index)
+
+        self._in_threads(work)
+        least, index = (torch.stack(parts) for parts in zip(*(found[begin] for begin in sorted(found)), strict=True))
+        which = least.argmin(dim=0)[None]
+        return least.gather(0, which)[0], self.filters.start + index.gather(0, which)[0]
+
+    def absolute(self) -> Float[torch.Tensor, "n w"]:
+        """Sum of the absolute responses of the filters to each rotation of the views."""
+        if not self._compiled:
+            return self.by_torch().abs_().sum(dim=2)
+        sums = self.rows.new_empty(len(self.tiles), *self._shape)
+        self._in_threads(lambda *arguments: absolute(*arguments, sums.numpy()))
+        return sum(sums[1:], start=sums[0])
+
+    def by_torch(self) -> Float[torch.Tensor, "n w m"]:
+        """`responses` on any device. Sums may be rounded differently in another batch."""
+        products = torch.matmul(self.rows, self.tiles).movedim(0, 2).flatten(2)  # (f, 2 n, filters of all tiles)
+        products = products[..., self.first : self.first + len(self.biases)].unflatten(1, self._shape[:1] + (2,))
+        real, imaginary = products.permute(2, 1, 0, 3)
+        count = self.width // 2 + 1
+        even, odd = torch.matmul(self.inverse[0, :count], real), torch.matmul(self.inverse[1, :count], imaginary)
+        right = (even - odd)[:, 1 : (self.width + 1) // 2].flip(1)
+        return torch.cat([even + odd, right], dim=1) + self.biases
+
+    @property
+    def _compiled(self) -> bool:
+        return self.rows.device.type == "cpu"
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return self.rows.shape[1] // 2, self.width
+
+    def _in_threads(self, work: Callable[..., None]) -> None:
+        """Call `work` with the arguments of a compiled function of products.py up to `end`, for the tiles of each thread."""
+        arrays = [each.numpy() for each in (self.rows, self.inverse, self.tiles, self.biases)]
+        large = self.rows.numel() * len(self.tiles) * TILE >= SMALL
+        count = min(torch.get_num_threads(), len(self.tiles)) if large else 1
+        in_threads(lambda begin, end: work(*arrays, self.first, begin, end), len(self.tiles), count)
 
 
 def _rows(views: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "f rows parts"]:
@@ -134,3 +170,10 @@ def _rows(views: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "f rows pa
     rows[:, :, 1, :, 1] = rows[:, :, 0, :, 0]
     return rows.flatten(3).flatten(1, 2)
 
+
+def inverse(width: int) -> Float64[torch.Tensor, "2 i f"]:
+    """What makes responses of real parts of products, and of imaginary ones: at rotations 0 to w // 2, and 0 up to an even number."""
+    count = width // 2 + 1
+    identity = torch.eye(count, dtype=torch.float64)
+    halves = torch.stack([torch.fft.irfft(parts, n=width, dim=0)[:count] for parts in (identity, 1j * identity)])
+    return torch.nn.functional.pad(halves, (0, 0, 0, count % 2))
