@@ -112,8 +112,5 @@ class NearestFilters:
         least = views.new_full((n, width), torch.inf)
         index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
         for chunk in self._spectra.chunks(views, self._biases, among):
-            values, which = chunk.least()
-            less = values < least[chunk.views]
-            least[chunk.views] = values.where(less, least[chunk.views])
-            index[chunk.views] = which.where(less, index[chunk.views])
+            chunk.lower(least[chunk.views], index[chunk.views])
         return least, index

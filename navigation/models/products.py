@@ -87,10 +87,10 @@ _two_rows, _four_rows = _sums(2), _sums(4)
 
 
 @compiled
-def _multiply(left, right, sums, at):
-    """left (i, k) x right (k, TILE), stored as columns `at` to `at` + TILE of sums; i is even."""
+def _multiply(left, right, columns, sums, at):
+    """left (i, k) x the first columns of right (k, TILE), or a few more, stored from column `at` of sums on; i is even."""
     rows = left.shape[0]
-    for column in range(0, TILE, COLUMNS * REGISTER // left.itemsize):
+    for column in range(0, columns, COLUMNS * REGISTER // left.itemsize):
         for row in range(0, rows - rows % 4, 4):
             _four_rows(left, row, right, column, sums, at + column)
         if rows % 4:
@@ -98,27 +98,43 @@ def _multiply(left, right, sums, at):
 
 
 @compiled
-def _of_tile(rows, tile, products):
-    """Products (2 n, f, TILE) of the filters of a tile (f, k, TILE) with n views: their real parts, then their imaginary parts."""
+def _of_tile(rows, tile, columns, inverse, products):
+    """Products (2 n, f, TILE) of filters of a tile (f, k, TILE) with n views: of each view the real parts, then the imaginary parts.
+
+    In the order of `inverse`: frequencies of even numbers come first.
+    """
     flat = products.reshape(len(products), products.shape[1] * TILE)
+    of_even, of_odd = inverse[0].shape[2], inverse[1].shape[2]
     for f in range(len(rows)):
-        _multiply(rows[f], tile[f], flat, f * TILE)
+        place = f if of_odd == 0 else f // 2 + f % 2 * of_even
+        _multiply(rows[f], tile[f], columns, flat, place * TILE)
 
 
 @compiled
-def _turned(real, imaginary, inverse, parts, responses):
+def _turned(real, imaginary, columns, inverse, parts, responses):
     """Responses (w, TILE) to all rotations of a view, from its products (f, TILE).
 
     r[k] = even[k] + odd[k] and r[-k] = even[k] - odd[k]: what is even in the rotation comes from the real parts, what is odd from the
-    imaginary parts. So half of the rotations need an inverse transform.
+    imaginary parts. After half a turn, what comes from frequencies of odd numbers has the other sign. So the inverse transform is
+    computed for a quarter of the rotations (or for half of them, where their number is odd, see `inverse_transform`).
     """
-    _multiply(inverse[0], real, parts[0], 0)
-    _multiply(inverse[1], imaginary, parts[1], 0)
-    for k in range(len(responses) // 2 + 1):
-        even, odd, left, right = parts[0, k], parts[1, k], responses[k], responses[-k]
-        for j in range(TILE):
-            right[j] = even[j] - odd[j]
-            left[j] = even[j] + odd[j]  # where both are the same rotation, odd is 0
+    width, of_even = len(responses), inverse[0].shape[2]
+    for part in range(2):
+        products = imaginary if part else real
+        _multiply(inverse[0][part], products[:of_even], columns, parts[2 * part], 0)
+        _multiply(inverse[1][part], products[of_even:], columns, parts[2 * part + 1], 0)
+    for k in range(width // 4 + 1 if width % 2 == 0 else width // 2 + 1):
+        a, b, c, d = parts[0, k], parts[1, k], parts[2, k], parts[3, k]
+        # Where two of these are the same rotation, they are the same but for rounding.
+        left, right = responses[k], responses[-k]
+        for j in range(columns):
+            right[j] = (a[j] + b[j]) - (c[j] + d[j])
+            left[j] = (a[j] + b[j]) + (c[j] + d[j])
+        if width % 2 == 0:
+            left, right = responses[width // 2 + k - width], responses[width // 2 - k]
+            for j in range(columns):
+                right[j] = (a[j] - b[j]) - (c[j] - d[j])
+                left[j] = (a[j] - b[j]) + (c[j] - d[j])
 
 
 @compiled
@@ -126,13 +142,13 @@ def _scratch(rows, inverse, width):
     """Arrays for what is computed on the way."""
     frequencies, count, _ = rows.shape
     products = np.empty((count, frequencies, TILE), rows.dtype)
-    parts = np.empty((2, inverse.shape[1], TILE), rows.dtype)
+    parts = np.empty((4, inverse[0].shape[1], TILE), rows.dtype)
     return products, parts, np.empty((width, TILE), rows.dtype)
 
 
 # In all of these, of n views and of the filters `first` to `first` + m of some tiles:
 #   rows (f, 2 n, k): of each view what gives the real parts of its products, then what gives the imaginary parts
-#   inverse (2, i, f): transforms of real and of imaginary parts to rotations 0 to w // 2; i is even
+#   inverse: as `inverse_transform`
 #   tiles (t, f, k, TILE): filters; those in tiles `begin` to `end` are used
 #   biases (m,): added to the responses
 
@@ -142,12 +158,12 @@ def respond(rows, inverse, tiles, biases, first, begin, end, responses):
     """Store the responses (n, w, m)."""
     products, parts, turned = _scratch(rows, inverse, responses.shape[1])
     for tile in range(begin, end):
-        _of_tile(rows, tiles[tile], products)
         column = tile * TILE - first
         start, stop = max(0, -column), min(TILE, len(biases) - column)
+        _of_tile(rows, tiles[tile], stop, inverse, products)
         bias = biases[column + start : column + stop]
         for v in range(len(responses)):
-            _turned(products[2 * v], products[2 * v + 1], inverse, parts, turned)
+            _turned(products[2 * v], products[2 * v + 1], stop, inverse, parts, turned)
             for k in range(len(turned)):
                 found, stored = turned[k, start:stop], responses[v, k, column + start : column + stop]
                 for j in range(len(bias)):
@@ -164,12 +180,12 @@ def nearest(rows, inverse, tiles, biases, first, begin, end, least, index):
     products, parts, turned = _scratch(rows, inverse, least.shape[1])
     bits = turned.view(np.int32)
     for tile in range(begin, end):
-        _of_tile(rows, tiles[tile], products)
         column = tile * TILE - first
         start, stop = max(0, -column), min(TILE, len(biases) - column)
+        _of_tile(rows, tiles[tile], stop, inverse, products)
         bias = biases[column + start : column + stop]
         for v in range(len(least)):
-            _turned(products[2 * v], products[2 * v + 1], inverse, parts, turned)
+            _turned(products[2 * v], products[2 * v + 1], stop, inverse, parts, turned)
             for k in range(len(turned)):
                 responses, ordered, low = turned[k, start:stop], bits[k, start:stop], np.int32(MAX)
                 for j in range(len(bias)):
@@ -189,12 +205,12 @@ def absolute(rows, inverse, tiles, biases, first, begin, end, sums):
     """Store the sums (t, n, w) of the absolute responses of each tile."""
     products, parts, turned = _scratch(rows, inverse, sums.shape[2])
     for tile in range(begin, end):
-        _of_tile(rows, tiles[tile], products)
         column = tile * TILE - first
         start, stop = max(0, -column), min(TILE, len(biases) - column)
+        _of_tile(rows, tiles[tile], stop, inverse, products)
         bias = biases[column + start : column + stop]
         for v in range(sums.shape[1]):
-            _turned(products[2 * v], products[2 * v + 1], inverse, parts, turned)
+            _turned(products[2 * v], products[2 * v + 1], stop, inverse, parts, turned)
             for k in range(len(turned)):
                 responses, total = turned[k, start:stop], np.float32(0)
                 for j in range(len(bias)):

@@ -14,7 +14,7 @@ from .products import TILE, absolute, nearest, respond
 
 # Filters, and views, that are multiplied at once: what is computed on the way then stays in the processor's cache
 # (measured on an AMD EPYC with 1 MB of it per core).
-FILTERS, VIEWS = 960, 16
+FILTERS, VIEWS = 4096, 16
 SMALL = 2**23  # multiplications; below it, one thread is the quickest
 
 
@@ -27,7 +27,7 @@ class Spectra:
 
     def __init__(self, filters: Float[torch.Tensor, "m h w"]):
         self.width, self.size, self._blocks = filters.shape[2], FILTERS, []
-        self._inverse = inverse(self.width).to(filters)
+        self._inverse = tuple(each.to(filters) for each in inverse_transform(self.width))
         self._add(filters)
 
     def __len__(self) -> int:
@@ -59,7 +59,7 @@ class Spectra:
             biases: (m,) Added to the responses; None means none.
             among: The filters that respond.
         """
-        rows = _rows(views)
+        rows = [_rows(some) for some in views.split(VIEWS)]
         start, stop, _ = among.indices(len(self))
         for begin, block in zip(range(0, stop, self.size), self._blocks, strict=False):
             first, last = max(start - begin, 0), min(stop - begin, len(block))
@@ -68,10 +68,11 @@ class Spectra:
             filters = slice(begin + first, begin + last)
             added = views.new_zeros(last - first) if biases is None else biases[filters]
             tiles = block.storage[first // TILE : -(-last // TILE)]
-            for view in range(0, len(views), VIEWS):
-                some = slice(view, min(view + VIEWS, len(views)))
-                of_views = rows[:, 2 * some.start : 2 * some.stop].contiguous()
+            view = 0
+            for of_views in rows:
+                some = slice(view, view + of_views.shape[1] // 2)
                 yield Chunk(some, filters, of_views, self._inverse, tiles, added, first % TILE, self.width)
+                view = some.stop
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class Chunk:
         views: Which views.
         filters: Which filters.
         rows: (f, 2 n, k) Of each view what gives the real parts of its products, then what gives the imaginary parts.
-        inverse: (2, i, f) As `inverse`.
+        inverse: As `inverse_transform`.
         tiles: (t, f, k, TILE) Transforms of the filters.
         biases: (m,) Added to the responses.
         first: Where the first of the filters is in the tiles.
@@ -92,7 +93,7 @@ class Chunk:
     views: slice
     filters: slice
     rows: torch.Tensor
-    inverse: torch.Tensor
+    inverse: tuple[torch.Tensor, ...]
     tiles: torch.Tensor
     biases: torch.Tensor
     first: int
@@ -106,22 +107,25 @@ class Chunk:
         self._in_threads(lambda *arguments: respond(*arguments, responses.numpy()))
         return responses
 
-    def least(self) -> tuple[Float[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
-        """The least response to each rotation of the views, and the number of the filter among all filters that gives it."""
+    def lower(self, least: Float[torch.Tensor, "n w"], index: Int64[torch.Tensor, "n w"]) -> None:
+        """Where a response to a rotation of the views is below `least`, change it to the least one, and `index` to its filter."""
         if not self._compiled:
-            least, index = self.by_torch().min(dim=2)
-            return least, self.filters.start + index
+            values, which = self.by_torch().min(dim=2)
+            less = values < least
+            least[less], index[less] = values[less], self.filters.start + which[less]
+            return
         found = {}
 
         def work(*arguments) -> None:
-            least, index = np.full(self._shape, np.inf, self.rows.numpy().dtype), np.zeros(self._shape, np.int64)
-            nearest(*arguments, least, index)
-            found[arguments[-2]] = torch.from_numpy(least), torch.from_numpy(index)
+            own = np.full(self._shape, np.inf, np.float32), np.zeros(self._shape, np.int64)
+            nearest(*arguments, *own)
+            found[arguments[-2]] = own
 
         self._in_threads(work)
-        least, index = (torch.stack(parts) for parts in zip(*(found[begin] for begin in sorted(found)), strict=True))
-        which = least.argmin(dim=0)[None]
-        return least.gather(0, which)[0], self.filters.start + index.gather(0, which)[0]
+        for begin in sorted(found):
+            values, which = found[begin]
+            less = values < least.numpy()
+            least.numpy()[less], index.numpy()[less] = values[less], self.filters.start + which[less]
 
     def absolute(self) -> Float[torch.Tensor, "n w"]:
         """Sum of the absolute responses of the filters to each rotation of the views."""
@@ -135,11 +139,8 @@ class Chunk:
         """`responses` on any device. Sums may be rounded differently in another batch."""
         products = torch.matmul(self.rows, self.tiles).movedim(0, 2).flatten(2)  # (f, 2 n, filters of all tiles)
         products = products[..., self.first : self.first + len(self.biases)].unflatten(1, self._shape[:1] + (2,))
-        real, imaginary = products.permute(2, 1, 0, 3)
-        count = self.width // 2 + 1
-        even, odd = torch.matmul(self.inverse[0, :count], real), torch.matmul(self.inverse[1, :count], imaginary)
-        right = (even - odd)[:, 1 : (self.width + 1) // 2].flip(1)
-        return torch.cat([even + odd, right], dim=1) + self.biases
+        spectra = torch.complex(*products.unbind(dim=2))  # (f, n, m)
+        return torch.fft.irfft(spectra, n=self.width, dim=0).movedim(0, 1) + self.biases
 
     @property
     def _compiled(self) -> bool:
@@ -151,7 +152,8 @@ class Chunk:
 
     def _in_threads(self, work: Callable[..., None]) -> None:
         """Call `work` with the arguments of a compiled function of products.py up to `end`, for the tiles of each thread."""
-        arrays = [each.numpy() for each in (self.rows, self.inverse, self.tiles, self.biases)]
+        inverse = tuple(each.numpy() for each in self.inverse)
+        arrays = self.rows.numpy(), inverse, self.tiles.numpy(), self.biases.numpy()
         large = self.rows.numel() * len(self.tiles) * TILE >= SMALL
         count = min(torch.get_num_threads(), len(self.tiles)) if large else 1
         in_threads(lambda begin, end: work(*arrays, self.first, begin, end), len(self.tiles), count)
@@ -163,17 +165,22 @@ def _rows(views: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "f rows pa
         transformed = torch.from_numpy(np.fft.rfft(views.numpy()))
     else:
         transformed = torch.fft.rfft(views)
-    n, h, f = transformed.shape
-    rows = views.new_empty(f, n, 2, h, 2)
-    rows[:, :, 0] = torch.view_as_real(transformed).permute(2, 0, 1, 3)
-    rows[:, :, 1, :, 0] = -rows[:, :, 0, :, 1]
-    rows[:, :, 1, :, 1] = rows[:, :, 0, :, 0]
-    return rows.flatten(3).flatten(1, 2)
+    rows = torch.stack([transformed, 1j * transformed], dim=1)  # (n, 2, h, f)
+    return torch.view_as_real(rows.permute(3, 0, 1, 2).contiguous()).flatten(3).flatten(1, 2)
 
 
-def inverse(width: int) -> Float64[torch.Tensor, "2 i f"]:
-    """What makes responses of real parts of products, and of imaginary ones: at rotations 0 to w // 2, and 0 up to an even number."""
+def inverse_transform(width: int) -> tuple[Float64[torch.Tensor, "2 i even"], Float64[torch.Tensor, "2 i odd"]]:
+    """What makes responses of the real parts of products, and of the imaginary parts, at rotations 0, 1, ..
+
+    The first is for frequencies of even numbers, and the second for those of odd numbers. They are for rotations 0 to w // 4: by their
+    sum and their difference the others are known. Where w is odd, the first is for all frequencies and rotations 0 to w // 2, and the
+    second for none. Rows are filled up with 0 to an even number.
+    """
     count = width // 2 + 1
     identity = torch.eye(count, dtype=torch.float64)
-    halves = torch.stack([torch.fft.irfft(parts, n=width, dim=0)[:count] for parts in (identity, 1j * identity)])
-    return torch.nn.functional.pad(halves, (0, 0, 0, count % 2))
+    whole = torch.stack([torch.fft.irfft(parts, n=width, dim=0) for parts in (identity, 1j * identity)])
+    of_even, of_odd = (whole[..., ::2], whole[..., 1::2]) if width % 2 == 0 else (whole, whole[..., :0])
+    rotations = width // 4 + 1 if width % 2 == 0 else count
+    return tuple(
+        torch.nn.functional.pad(each[:, :rotations], (0, 0, 0, rotations % 2)).contiguous() for each in (of_even, of_odd)
+    )
