@@ -26,6 +26,7 @@ from jaxtyping import Float, Float32, Float64, Int64
 from ..feature_mask import FeatureMask
 from .spectra import Spectra
 
+
 class FilterBank:
     """Filters, ready to meet any number of views.
 
@@ -90,7 +91,9 @@ class NearestFilters:
     def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]):
         self._spectra, self._biases = Spectra(filters), biases
 
-    def appended(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> "NearestFilters":
+    def appended(
+        self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]
+    ) -> "NearestFilters":
         """These filters and then others; this object stays as it is."""
         combined = copy.copy(self)
         combined._spectra, combined._biases = self._spectra.appended(filters), torch.cat([self._biases, biases])

@@ -7,7 +7,7 @@ from typing import TypeVar
 import torch
 from jaxtyping import Complex, Float
 
-from .products import TILE
+from .products import PANEL, TILE
 
 Self = TypeVar("Self", bound="Growing")
 
@@ -69,7 +69,7 @@ class Growing:
 
 
 class Tiles(Growing):
-    """Fourier transforms of filters, in tiles (t, f, parts, TILE): at each frequency the real and imaginary parts of all rows.
+    """Fourier transforms of filters, in tiles (t, f, TILE / PANEL, parts, PANEL): the real and imaginary parts of all rows.
 
     Args:
         spectra: (m, h, f) The first ones.
@@ -78,13 +78,13 @@ class Tiles(Growing):
     def __init__(self, spectra: Complex[torch.Tensor, "m h f"]):
         m, height, frequencies = spectra.shape
         real = torch.view_as_real(spectra)
-        tiles = real.new_zeros(-(-m // TILE), frequencies, 2 * height, TILE)
+        tiles = real.new_zeros(-(-m // TILE), frequencies, TILE // PANEL, 2 * height, PANEL)
         self._length = 0
         self._enter(tiles, spectra)
         self._length, self._storage = m, _Storage(tiles, m)
 
     @property
-    def storage(self) -> Float[torch.Tensor, "t f parts tile"]:
+    def storage(self) -> Float[torch.Tensor, "t f panels parts panel"]:
         """The whole storage. Numbers after the length have no meaning."""
         return self._storage.tensor
 
@@ -99,12 +99,12 @@ class Tiles(Growing):
 
     def _enter(self, storage: torch.Tensor, more: torch.Tensor) -> None:
         parts = torch.view_as_real(more)  # (m, h, f, 2)
+        panels = storage.unflatten(3, (-1, 2)).permute(0, 2, 3, 1, 4, 5)  # (t, panels, h, f, 2, PANEL)
         done = 0
         while done < len(parts):
-            tile, column = divmod(self._length + done, TILE)
-            some = parts[done : done + TILE - column]
-            # In two steps, as a plain transposition is much faster.
-            transposed = some.flatten(1).T.contiguous().unflatten(0, parts.shape[1:])  # (h, f, 2, some)
-            rows = storage[tile].unflatten(1, (-1, 2)).transpose(0, 1)  # (h, f, 2, TILE)
-            rows[..., column : column + len(some)] = transposed
+            panel, column = divmod(self._length + done, PANEL)
+            some = parts[done : done + PANEL - column]
+            # In two steps, as a plain transposition is slower.
+            transposed = some.flatten(1).T.contiguous().unflatten(0, parts.shape[1:])
+            panels[divmod(panel, panels.shape[1])][..., column : column + len(some)] = transposed
             done += len(some)

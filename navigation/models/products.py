@@ -5,6 +5,7 @@ than among others. Here each number is summed by itself in one place of a regist
 computed next to it. For such small matrices this is faster than BLAS.
 """
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,19 @@ from numba.extending import intrinsic
 
 from tussock.render.compile import compiled
 
-TILE = 64  # filters that are stored together, and multiplied at once: what is computed on the way stays in the processor's cache
-REGISTER = 32  # bytes of one; those of AVX-512 are larger, but gain little (measured on an AMD EPYC 9004: 97 to 88 Gflop/s)
-COLUMNS = 2  # registers next to each other
+TILE = 64  # filters that are multiplied at once: what is computed on the way stays in the processor's cache
+PANEL = 16  # of these that are stored together: they are read from memory in one go
+REGISTER = (
+    32  # bytes of one; those of AVX-512 are larger, but gain little (measured on an AMD EPYC 9004: 97 to 88 Gflop/s)
+)
 MAX = 2**31 - 1  # of a whole number of 32 bits
 
 
 def _sums(rows: int) -> Any:
     """A function `(left, row, right, column, sums, start)` for compiled code.
 
-    It computes some rows of left (i, k) times some columns of right (k, j), from `row` and `column` on, as many as fill COLUMNS
-    registers each, and stores the sums (i, ..) from column `start` on. All are arrays of one type without gaps.
+    It computes some rows of left (i, k) times PANEL columns of right (k, j), from `row` and `column` on, and stores the sums (i, ..)
+    from column `start` on. All are arrays of one type without gaps.
     """
 
     @intrinsic
@@ -35,7 +38,7 @@ def _sums(rows: int) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             number, index = context.get_data_type(left.dtype), ir.IntType(64)
             lanes = REGISTER // context.get_abi_sizeof(number)
-            register = ir.VectorType(number, lanes)
+            register, registers = ir.VectorType(number, lanes), PANEL // lanes
             kind = {4: "f32", 8: "f64"}[context.get_abi_sizeof(number)]
             multiply_add = cgutils.get_or_insert_function(
                 builder.module, ir.FunctionType(register, [register] * 3), f"llvm.fmuladd.v{lanes}{kind}"
@@ -54,19 +57,19 @@ def _sums(rows: int) -> Any:
             of_left, left_step = array(left, values[0], values[1], zero)
             of_right, right_step = array(right, values[2], zero, values[3])
             of_sums, sums_step = array(sums, values[4], values[1], values[5])
-            totals = [[cgutils.alloca_once(builder, register) for _ in range(COLUMNS)] for _ in range(rows)]
-            for total in sum(totals, []):
+            totals = [[cgutils.alloca_once(builder, register) for _ in range(registers)] for _ in range(rows)]
+            for total in chain(*totals):
                 builder.store(ir.Constant(register, [0.0] * lanes), total)
             with cgutils.for_range(builder, left_step) as term:
                 factors = builder.gep(of_right, [builder.mul(term.index, right_step)])
-                loaded = [builder.load(at(builder.gep(factors, [index(k * lanes)])), align=4) for k in range(COLUMNS)]
+                loaded = [builder.load(at(builder.gep(factors, [index(k * lanes)])), align=4) for k in range(registers)]
                 for i in range(rows):
                     address = builder.gep(of_left, [builder.add(builder.mul(left_step, index(i)), term.index)])
                     repeated = _repeated(builder, builder.load(address), lanes)
                     for total, factor in zip(totals[i], loaded, strict=True):
                         builder.store(builder.call(multiply_add, [repeated, factor, builder.load(total)]), total)
             for i in range(rows):
-                for k in range(COLUMNS):
+                for k in range(registers):
                     address = builder.gep(of_sums, [builder.add(builder.mul(sums_step, index(i)), index(k * lanes))])
                     builder.store(builder.load(totals[i][k]), at(address), align=4)
             return context.get_dummy_value()
@@ -87,19 +90,18 @@ _two_rows, _four_rows = _sums(2), _sums(4)
 
 
 @compiled
-def _multiply(left, right, columns, sums, at):
-    """left (i, k) x the first columns of right (k, TILE), or a few more, stored from column `at` of sums on; i is even."""
+def _multiply(left, right, column, sums, at):
+    """left (i, k) x PANEL columns of right (k, j), from `column` on, stored from column `at` of sums on; i is even."""
     rows = left.shape[0]
-    for column in range(0, columns, COLUMNS * REGISTER // left.itemsize):
-        for row in range(0, rows - rows % 4, 4):
-            _four_rows(left, row, right, column, sums, at + column)
-        if rows % 4:
-            _two_rows(left, rows - 2, right, column, sums, at + column)
+    for row in range(0, rows - rows % 4, 4):
+        _four_rows(left, row, right, column, sums, at)
+    if rows % 4:
+        _two_rows(left, rows - 2, right, column, sums, at)
 
 
 @compiled
 def _of_tile(rows, tile, columns, inverse, products):
-    """Products (2 n, f, TILE) of filters of a tile (f, k, TILE) with n views: of each view the real parts, then the imaginary parts.
+    """Products (2 n, f, TILE) of the first filters of a tile with n views: of each view the real parts, then the imaginary parts.
 
     In the order of `inverse`: frequencies of even numbers come first.
     """
@@ -107,7 +109,8 @@ def _of_tile(rows, tile, columns, inverse, products):
     of_even, of_odd = inverse[0].shape[2], inverse[1].shape[2]
     for f in range(len(rows)):
         place = f if of_odd == 0 else f // 2 + f % 2 * of_even
-        _multiply(rows[f], tile[f], columns, flat, place * TILE)
+        for column in range(0, columns, PANEL):
+            _multiply(rows[f], tile[f, column // PANEL], 0, flat, place * TILE + column)
 
 
 @compiled
@@ -121,8 +124,9 @@ def _turned(real, imaginary, columns, inverse, parts, responses):
     width, of_even = len(responses), inverse[0].shape[2]
     for part in range(2):
         products = imaginary if part else real
-        _multiply(inverse[0][part], products[:of_even], columns, parts[2 * part], 0)
-        _multiply(inverse[1][part], products[of_even:], columns, parts[2 * part + 1], 0)
+        for column in range(0, columns, PANEL):
+            _multiply(inverse[0][part], products[:of_even], column, parts[2 * part], column)
+            _multiply(inverse[1][part], products[of_even:], column, parts[2 * part + 1], column)
     for k in range(width // 4 + 1 if width % 2 == 0 else width // 2 + 1):
         a, b, c, d = parts[0, k], parts[1, k], parts[2, k], parts[3, k]
         # Where two of these are the same rotation, they are the same but for rounding.
@@ -149,7 +153,7 @@ def _scratch(rows, inverse, width):
 # In all of these, of n views and of the filters `first` to `first` + m of some tiles:
 #   rows (f, 2 n, k): of each view what gives the real parts of its products, then what gives the imaginary parts
 #   inverse: as `inverse_transform`
-#   tiles (t, f, k, TILE): filters; those in tiles `begin` to `end` are used
+#   tiles: filters as in `Tiles`; those in tiles `begin` to `end` are used
 #   biases (m,): added to the responses
 
 

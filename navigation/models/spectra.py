@@ -84,7 +84,7 @@ class Chunk:
         filters: Which filters.
         rows: (f, 2 n, k) Of each view what gives the real parts of its products, then what gives the imaginary parts.
         inverse: As `inverse_transform`.
-        tiles: (t, f, k, TILE) Transforms of the filters.
+        tiles: Transforms of the filters, as `Tiles`.
         biases: (m,) Added to the responses.
         first: Where the first of the filters is in the tiles.
         width: Number of rotations.
@@ -137,8 +137,9 @@ class Chunk:
 
     def by_torch(self) -> Float[torch.Tensor, "n w m"]:
         """`responses` on any device. Sums may be rounded differently in another batch."""
-        products = torch.matmul(self.rows, self.tiles).movedim(0, 2).flatten(2)  # (f, 2 n, filters of all tiles)
-        products = products[..., self.first : self.first + len(self.biases)].unflatten(1, self._shape[:1] + (2,))
+        products = torch.matmul(self.rows[:, None], self.tiles)  # (t, f, panels, 2 n, PANEL)
+        products = products.permute(1, 3, 0, 2, 4).flatten(2)
+        products = products[..., self.first : self.first + len(self.biases)].unflatten(1, (-1, 2))
         spectra = torch.complex(*products.unbind(dim=2))  # (f, n, m)
         return torch.fft.irfft(spectra, n=self.width, dim=0).movedim(0, 1) + self.biases
 
@@ -161,10 +162,9 @@ class Chunk:
 
 def _rows(views: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "f rows parts"]:
     """For each view two rows: conj(V) F has the real part Re V Re F + Im V Im F, and the imaginary part Re V Im F - Im V Re F."""
-    if views.device.type == "cpu":  # by numpy, which transforms each row by itself, and so to the same bytes in every batch
-        transformed = torch.from_numpy(np.fft.rfft(views.numpy()))
-    else:
-        transformed = torch.fft.rfft(views)
+    on_cpu = views.device.type == "cpu"
+    # By numpy, which transforms each row by itself, and so to the same bytes in every batch.
+    transformed = torch.from_numpy(np.fft.rfft(views.numpy())) if on_cpu else torch.fft.rfft(views)
     rows = torch.stack([transformed, 1j * transformed], dim=1)  # (n, 2, h, f)
     return torch.view_as_real(rows.permute(3, 0, 1, 2).contiguous()).flatten(3).flatten(1, 2)
 
@@ -181,6 +181,6 @@ def inverse_transform(width: int) -> tuple[Float64[torch.Tensor, "2 i even"], Fl
     whole = torch.stack([torch.fft.irfft(parts, n=width, dim=0) for parts in (identity, 1j * identity)])
     of_even, of_odd = (whole[..., ::2], whole[..., 1::2]) if width % 2 == 0 else (whole, whole[..., :0])
     rotations = width // 4 + 1 if width % 2 == 0 else count
-    return tuple(
-        torch.nn.functional.pad(each[:, :rotations], (0, 0, 0, rotations % 2)).contiguous() for each in (of_even, of_odd)
-    )
+    padding = (0, 0, 0, rotations % 2)
+    even, odd = (torch.nn.functional.pad(each[:, :rotations], padding).contiguous() for each in (of_even, of_odd))
+    return even, odd
