@@ -31,18 +31,18 @@ class FilterBank:
     """Filters, ready to meet any number of views.
 
     Args:
-        filters: (m, h, w)
+        filters: (m, h, w) float32; or float64, with which sums are too exact for rounding to separate equal responses.
         biases: (m,) Added to the responses; None means none.
         mask: What the filters see of the views; None means everything.
     """
 
     def __init__(
         self,
-        filters: Float32[torch.Tensor, "m h w"],
+        filters: Float[torch.Tensor, "m h w"],
         biases: Float32[torch.Tensor, " m"] | None = None,
         mask: FeatureMask | None = None,
     ):
-        self._mask, self._width, self._biases = mask, filters.shape[2], biases
+        self._mask, self._width, self._biases, self._dtype = mask, filters.shape[2], biases, filters.dtype
         if mask is not None:
             filters = filters.double() * mask.visible.to(filters.device)
             self._sums = filters.sum(dim=(1, 2))
@@ -61,7 +61,8 @@ class FilterBank:
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
         """Response of each filter to each rotation of each view."""
-        responses = self._correlated(views) if self._mask is None else self.exact(views).float()
+        responses = self._correlated(views.to(self._dtype)) if self._mask is None else self.exact(views)
+        responses = responses.float()
         return responses if self._biases is None else responses + self._biases
 
     def exact(self, views: Float32[torch.Tensor, "n h w"]) -> Float64[torch.Tensor, "n w m"]:
