@@ -4,7 +4,7 @@ import numpy as np
 
 from tussock.render.compile import compiled
 
-GROUP = 16  # cells whose largest drive is found first
+GROUP = 32  # cells whose largest drive is found first
 COLUMNS = 64  # projections at once: what is computed of them then stays in the processor's cache
 
 
@@ -38,7 +38,9 @@ def largest_drives(projections, wiring, cells):
             for group in range(groups):
                 if maxima[group, j] >= limit:
                     first = group * GROUP
-                    found = _insert_all(drives, j, first, min(first + GROUP, len(wiring)), limit, values, cells[start + j], found)
+                    found = _insert_all(
+                        drives, j, first, min(first + GROUP, len(wiring)), limit, values, cells[start + j], found
+                    )
 
 
 @compiled

@@ -172,7 +172,9 @@ class MushroomBody(IncrementalModel):
         cells = torch.empty(projections.shape[1], self.firing, dtype=torch.int64)
         of_neurons, of_cells, chosen = projections.numpy(), wiring.numpy(), cells.numpy()
         in_threads(
-            lambda begin, end: largest_drives(np.ascontiguousarray(of_neurons[:, begin:end]), of_cells, chosen[begin:end]),
+            lambda begin, end: largest_drives(
+                np.ascontiguousarray(of_neurons[:, begin:end]), of_cells, chosen[begin:end]
+            ),
             len(cells),
             min(torch.get_num_threads(), len(cells)),
         )
