@@ -9,7 +9,7 @@ By the correlation theorem its Fourier transform along azimuth is, at each frequ
 
     R = sum over rows i of conj(V[i]) F[i]
 
-so all views meet all filters in one small product of matrices per frequency (`Spectra`). `FilterBank` is just this, and
+so all views meet all filters in one small product of matrices per frequency (`Spectra`, `products`). `FilterBank` is just this, and
 `NearestFilters` finds the filter with the least response.
 
 A mask stands still with the eye: it is part of the filters (see `FeatureMask`), and what it hides makes no difference.

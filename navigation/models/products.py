@@ -17,9 +17,9 @@ from tussock.render.compile import compiled
 
 TILE = 64  # filters that are multiplied at once: what is computed on the way stays in the processor's cache
 PANEL = 16  # of these that are stored together: they are read from memory in one go
-REGISTER = (
-    32  # bytes of one; those of AVX-512 are larger, but gain little (measured on an AMD EPYC 9004: 97 to 88 Gflop/s)
-)
+# Bytes of a register of the processor. Those of AVX-512 are larger, but gain little (on an AMD EPYC 9004, 97 to 88 Gflop/s), and where
+# there are none, such code is slower (48 to 80).
+REGISTER = 32
 MAX = 2**31 - 1  # of a whole number of 32 bits
 
 
@@ -178,8 +178,8 @@ def respond(rows, inverse, tiles, biases, first, begin, end, responses):
 def nearest(rows, inverse, tiles, biases, first, begin, end, least, index):
     """Where a response is below `least` (n, w), change it to the least response, and `index` (n, w) to its filter, from 0 to m - 1.
 
-    Of a float32 and of its bits as a whole number the order is the same, but for those below 0; of whole numbers, several are compared
-    at once.
+    All are float32. Their order is that of their bits as whole numbers, but for those below 0, whose bits are inverted here. The
+    compiler compares several whole numbers at once, and floats one by one.
     """
     products, parts, turned = _scratch(rows, inverse, least.shape[1])
     bits = turned.view(np.int32)

@@ -12,8 +12,8 @@ from ..threads import in_threads
 from .growing import Tiles
 from .products import TILE, absolute, nearest, respond
 
-# Filters, and views, that are multiplied at once: what is computed on the way then stays in the processor's cache
-# (measured on an AMD EPYC with 1 MB of it per core).
+# Filters that are stored together: this limits what is copied when others are added. Views that are multiplied at once: what is computed
+# on the way then stays in the processor's cache (measured on an AMD EPYC with 1 MB of it per core).
 FILTERS, VIEWS = 4096, 16
 SMALL = 2**23  # multiplications; below it, one thread is the quickest
 
