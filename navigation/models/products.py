@@ -44,19 +44,13 @@ def _sums(rows: int) -> Any:
                 builder.module, ir.FunctionType(register, [register] * 3), f"llvm.fmuladd.v{lanes}{kind}"
             )
 
-            def array(type_: Any, value: Any, first_row: Any, first_column: Any) -> tuple[Any, Any]:
-                """Address of a number of an array, and how many numbers one row has."""
-                made = context.make_array(type_)(context, builder, value)
-                step = cgutils.unpack_tuple(builder, made.shape)[1]
-                return builder.gep(made.data, [builder.add(builder.mul(first_row, step), first_column)]), step
-
             def at(address: Any) -> Any:
                 return builder.bitcast(address, register.as_pointer())
 
             zero = ir.Constant(index, 0)
-            of_left, left_step = array(left, values[0], values[1], zero)
-            of_right, right_step = array(right, values[2], zero, values[3])
-            of_sums, sums_step = array(sums, values[4], values[1], values[5])
+            of_left, left_step = _address(context, builder, left, values[0], values[1], zero)
+            of_right, right_step = _address(context, builder, right, values[2], zero, values[3])
+            of_sums, sums_step = _address(context, builder, sums, values[4], values[1], values[5])
             totals = [[cgutils.alloca_once(builder, register) for _ in range(registers)] for _ in range(rows)]
             for total in chain(*totals):
                 builder.store(ir.Constant(register, [0.0] * lanes), total)
@@ -77,6 +71,13 @@ def _sums(rows: int) -> Any:
         return types.void(left, types.intp, right, types.intp, sums, types.intp), generate
 
     return sums_of_products
+
+
+def _address(context: Any, builder: Any, array: Any, value: Any, row: Any, column: Any) -> tuple[Any, Any]:
+    """Address of a number of an array (i, j), and how many numbers a row has."""
+    made = context.make_array(array)(context, builder, value)
+    step = cgutils.unpack_tuple(builder, made.shape)[1]
+    return builder.gep(made.data, [builder.add(builder.mul(row, step), column)]), step
 
 
 def _repeated(builder: Any, number: Any, lanes: int) -> Any:
