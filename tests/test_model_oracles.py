@@ -34,9 +34,10 @@ from tussock.navigation.models import (
 )
 from tussock.navigation.models.adaboost import best_stump, haar_filters
 from tussock.navigation.models.base import SequenceModel, SnapshotModel
+from tussock.navigation.models.firing import largest_drives
 from tussock.navigation.models.infomax import RATES, infomax_update
 from tussock.navigation.models.mlp_rotation import jittered
-from tussock.navigation.models.mushroom_body import receptive_fields
+from tussock.navigation.models.mushroom_body import largest, receptive_fields
 from tussock.navigation.models.random import split_mix
 from tussock.navigation.scan import scan_window
 from tussock.world.errors import SettingError
@@ -448,6 +449,18 @@ def test_mushroom_body_scan_is_what_its_cells_do_at_each_rotation(columns, rows,
         for sent, familiarity in zip(projection_neurons(view, columns, rows, adaptation), scan, strict=True):
             firing = np.argsort(sent[wiring].sum(axis=1))[-10:]
             assert np.isclose(familiarity, -synapses[firing].mean(), atol=1e-5)
+
+
+@given(st.integers(1, 200), st.integers(1, 9), st.integers(1, 70), st.integers(0, 999), st.data())
+def test_cells_that_fire_are_those_of_a_stable_sort(cells, inputs, n, seed, data):
+    count = data.draw(st.integers(1, cells))
+    random = np.random.default_rng(seed)
+    projections = random.integers(-2, 3, (12, n)).astype(np.float32)  # small whole numbers, so that many cells tie
+    wiring, firing = random.integers(0, 12, (cells, inputs)), np.empty((n, count), dtype=np.int64)
+    largest_drives(projections, wiring, firing)
+    drives = projections[wiring].sum(axis=1)
+    assert np.array_equal(firing, (-drives).argsort(axis=0, kind="stable")[:count].T)
+    assert np.array_equal(firing, largest(torch.from_numpy(drives), count))
 
 
 def test_mushroom_body_averages_over_neighbouring_rotations():

@@ -1,5 +1,7 @@
 """The rotation engine against a loop that rolls the view."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 from tussock.navigation.models import spectra
 from tussock.navigation.models.filter_bank import FilterBank, NearestFilters
 from tussock.navigation.scan import best_turn, scan_window
+from tussock.navigation.threads import threads
 from tussock.world.errors import InputError
 from tussock.world.geometry import turn_of_columns, wrap_angle
 
@@ -54,13 +57,51 @@ def test_the_nearest_filter_is_the_one_with_the_least_response(size, seed, data)
     assert torch.allclose(least.double(), expected.gather(2, index[..., None])[..., 0], atol=1e-4)
 
 
+def test_filters_that_are_added_and_left_out_across_tiles():
+    # More than two tiles of filters, in steps that end inside a panel, and others added to the same beginning.
+    views, filters = random_images(3, 2, 10, 0), random_images(150, 2, 10, 1)
+    biases = torch.arange(150.0)
+    expected = by_rolling(views, filters, biases)
+    beginning = NearestFilters(filters[:5], biases[:5])
+    other = beginning.appended(-filters[:40], biases[:40])  # stored where the next ones would be
+    grown = beginning
+    for first, last in pairwise((5, 21, 64, 100, 130, 150)):
+        grown = grown.appended(filters[first:last], biases[first:last])
+    expected_of_other = by_rolling(views, torch.cat([filters[:5], -filters[:40]]), torch.cat([biases[:5], biases[:40]]))
+    assert torch.equal(other.nearest(views)[1], expected_of_other.argmin(dim=2))
+    for some in (slice(None), slice(3), slice(17, 140), slice(63, 64), slice(64, 129), slice(149, 150)):
+        least, index = grown.nearest(views, some)
+        assert torch.equal(index, expected[..., some].argmin(dim=2) + (some.start or 0))
+        assert torch.allclose(least.double(), expected[..., some].amin(dim=2), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "m"), [(1, 1, 1), (2, 2, 70), (3, 7, 5), (2, 8, 65), (5, 10, 20), (4, 90, 130)]
+)
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_compiled_responses_equal_those_of_torch_and_of_any_number_of_threads(height, width, m, dtype, monkeypatch):
+    monkeypatch.setattr(spectra, "SMALL", 0)
+    views, filters = random_images(5, height, width, 0).to(dtype), random_images(m, height, width, 1).to(dtype)
+    biases, among = torch.arange(float(m)).to(dtype), slice(m // 4, m)
+    tolerance = 1e-10 if dtype == torch.float64 else 1e-3
+    (chunk,) = spectra.Spectra(filters).chunks(views, biases, among)
+    results = []
+    for number in (1, 2, 3):
+        with threads(number):
+            responses = chunk.responses()
+            assert torch.allclose(responses, chunk.by_torch(), atol=tolerance)
+            results.append((responses, chunk.absolute()))
+    assert torch.allclose(results[0][1], results[0][0].abs().sum(dim=2), rtol=1e-5)
+    assert all(torch.equal(one, first) for result in results for one, first in zip(result, results[0], strict=True))
+
+
 @pytest.mark.parametrize(("n", "m", "width"), [(1, 600, 8), (32, 40, 36), (32, 1, 64), (1, 40, 121), (32, 600, 90)])
 def test_threads_and_batches_change_responses_by_no_more_than_the_stated_rounding(n, m, width):
     views, filters = random_images(n, 5, width, m + n), random_images(m, 5, width, m + n + 1)
     sizes = views.flatten(start_dim=1).norm(dim=1)[:, None, None] * filters.flatten(start_dim=1).norm(dim=1)
     tolerance = 1e-6 * width**0.5 * sizes
     expected = by_rolling(views, filters, torch.zeros(m))
-    threads = torch.get_num_threads()
+    before = torch.get_num_threads()
     try:
         for number in (1, 2, 5):
             torch.set_num_threads(number)
@@ -72,7 +113,7 @@ def test_threads_and_batches_change_responses_by_no_more_than_the_stated_roundin
                 assert ((responses - expected).abs() <= tolerance).all()
             assert ((least - expected.amin(dim=2)).abs() <= tolerance.amax(dim=2)).all()
     finally:
-        torch.set_num_threads(threads)
+        torch.set_num_threads(before)
 
 
 def test_the_best_turn_is_left_for_low_rotations_and_right_for_high_ones():

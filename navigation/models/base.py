@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol, TypeVar, dataclass_transform, runtim
 import attrs
 import numpy as np
 import torch
-from jaxtyping import Bool, Float32, Int64
+from jaxtyping import Bool, Float, Float32, Int64
 
 from tussock.world.errors import SettingError
 from tussock.world.settings import instance_of, whole
@@ -267,7 +267,7 @@ class Model(ABC):
         return rows.reshape(-1, *shape) if self.mask is None else self.mask.spread(rows)
 
     def _bank(
-        self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None
+        self, filters: Float[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None
     ) -> FilterBank:
         """Filters that meet what the eye sees."""
         return FilterBank(filters, biases, self.mask)

@@ -9,8 +9,8 @@ By the correlation theorem its Fourier transform along azimuth is, at each frequ
 
     R = sum over rows i of conj(V[i]) F[i]
 
-so all views meet all filters in one small product of matrices per frequency (`Spectra`). `FilterBank` is just this. `Rotations` gives
-the same, faster where filters are many, and `NearestFilters` finds the filter with the least response.
+so all views meet all filters in one small product of matrices per frequency (`Spectra`, `products`). `FilterBank` is just this, and
+`NearestFilters` finds the filter with the least response.
 
 A mask stands still with the eye: it is part of the filters (see `FeatureMask`), and what it hides makes no difference.
 
@@ -19,8 +19,6 @@ agree within 1e-6 sqrt(w) |V| |F| (rounding).
 """
 
 import copy
-from collections.abc import Iterator
-from typing import TypeVar
 
 import torch
 from jaxtyping import Float, Float32, Float64, Int64
@@ -28,27 +26,23 @@ from jaxtyping import Float, Float32, Float64, Int64
 from ..feature_mask import FeatureMask
 from .spectra import Spectra
 
-RESPONSES = 2**17  # that `Rotations` computes at once: they stay in the processor's cache
-
-Bank = TypeVar("Bank", bound="Rotations")
-
 
 class FilterBank:
     """Filters, ready to meet any number of views.
 
     Args:
-        filters: (m, h, w)
+        filters: (m, h, w) float32; or float64, with which sums are too exact for rounding to separate equal responses.
         biases: (m,) Added to the responses; None means none.
         mask: What the filters see of the views; None means everything.
     """
 
     def __init__(
         self,
-        filters: Float32[torch.Tensor, "m h w"],
+        filters: Float[torch.Tensor, "m h w"],
         biases: Float32[torch.Tensor, " m"] | None = None,
         mask: FeatureMask | None = None,
     ):
-        self._mask, self._width, self._biases = mask, filters.shape[2], biases
+        self._mask, self._width, self._biases, self._dtype = mask, filters.shape[2], biases, filters.dtype
         if mask is not None:
             filters = filters.double() * mask.visible.to(filters.device)
             self._sums = filters.sum(dim=(1, 2))
@@ -67,7 +61,8 @@ class FilterBank:
 
     def responses(self, views: Float32[torch.Tensor, "n h w"]) -> Float32[torch.Tensor, "n w m"]:
         """Response of each filter to each rotation of each view."""
-        responses = self._correlated(views) if self._mask is None else self.exact(views).float()
+        responses = self._correlated(views.to(self._dtype)) if self._mask is None else self.exact(views)
+        responses = responses.float()
         return responses if self._biases is None else responses + self._biases
 
     def exact(self, views: Float32[torch.Tensor, "n h w"]) -> Float64[torch.Tensor, "n w m"]:
@@ -80,74 +75,30 @@ class FilterBank:
         if self._training is not None:  # products that torch can differentiate
             spectra, filters = torch.fft.rfft(views).permute(2, 0, 1), torch.fft.rfft(self._training).permute(2, 1, 0)
             return torch.fft.irfft(torch.bmm(spectra.conj(), filters), n=self._width, dim=0).movedim(0, 1)
-        responses = views.new_empty(len(views), len(self._spectra), self._width)
-        for view, filters, (real, imaginary) in self._spectra.products(views):
-            count = filters.stop - filters.start
-            for k in range(len(real)):
-                spectra = torch.complex(real[k, :, :count], imaginary[k, :, :count])
-                responses[view + k, filters] = torch.fft.irfft(spectra, n=self._width, dim=0).T
-        return responses.mT
+        responses = views.new_empty(len(views), self._width, len(self._spectra))
+        for chunk in self._spectra.chunks(views):
+            responses[chunk.views, :, chunk.filters] = chunk.responses()
+        return responses
 
 
-class Rotations:
-    """Responses of many filters to all rotations, one view after the other.
-
-    They are those of a `FilterBank`, found faster: products are real, and a response is split into what is even in the rotation (the
-    inverse transform of the real parts of R) and what is odd (that of the imaginary parts). As r[k] = even[k] + odd[k] and
-    r[-k] = even[k] - odd[k], half of the rotations need an inverse transform, as a product of matrices.
+class NearestFilters:
+    """Finds the filter with the least response to each rotation of a view.
 
     Args:
         filters: (m, h, w)
-        biases: (m,) Added to the responses; None means none.
+        biases: (m,) Added to the responses.
     """
 
-    def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"] | None = None):
-        width = filters.shape[2]
+    def __init__(self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]):
         self._spectra, self._biases = Spectra(filters), biases
-        count = width // 2 + 1
-        identity = torch.eye(count, dtype=torch.float64, device=filters.device)
-        self._even = torch.fft.irfft(identity, n=width, dim=0)[:count].float()
-        self._odd = torch.fft.irfft(1j * identity, n=width, dim=0)[:count].float()
-        self._right = slice(1, (width + 1) // 2)
-        # Rotations 0, 1, .. w // 2 come first, then as many to the right: where each rotation stands.
-        rotation = torch.arange(width, device=filters.device)
-        self.order = torch.where(rotation < count, rotation, count - 1 + width - rotation)
 
-    def appended(self: Bank, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]) -> Bank:
-        """These filters and then others, all with biases; this object stays as it is."""
-        assert self._biases is not None
+    def appended(
+        self, filters: Float32[torch.Tensor, "m h w"], biases: Float32[torch.Tensor, " m"]
+    ) -> "NearestFilters":
+        """These filters and then others; this object stays as it is."""
         combined = copy.copy(self)
         combined._spectra, combined._biases = self._spectra.appended(filters), torch.cat([self._biases, biases])
         return combined
-
-    def responses(
-        self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> Iterator[tuple[slice, int, Float32[torch.Tensor, "views w filters"]]]:
-        """Which views, the index of a filter, and the responses of this and the next filters to the views; for all views and filters.
-
-        The rotations are in an order of their own: `responses[:, order]` has them as a view turns.
-        """
-        width, count = views.shape[2], len(self._even)
-        for start, filters, (real, imaginary) in self._spectra.products(views, among):
-            m = filters.stop - filters.start
-            if self._biases is not None:  # frequency 0 adds to all rotations alike
-                real[:, 0, :m] += width * self._biases[filters]
-            size = max(1, RESPONSES // (width * m))
-            for part, (reals, imaginaries) in enumerate(zip(real.split(size), imaginary.split(size), strict=True)):
-                even, odd = torch.empty_like(reals), torch.empty_like(imaginaries)
-                for k in range(len(reals)):  # one by one, to the same bytes as alone
-                    torch.mm(self._even, reals[k], out=even[k])
-                    torch.mm(self._odd, imaginaries[k], out=odd[k])
-                even, odd = even[..., :m], odd[..., :m]
-                responses = torch.empty(len(even), width, m, device=views.device)
-                torch.add(even, odd, out=responses[:, :count])
-                torch.sub(even[:, self._right], odd[:, self._right], out=responses[:, count:])
-                view = start + part * size
-                yield slice(view, view + len(even)), filters.start, responses
-
-
-class NearestFilters(Rotations):
-    """Finds the filter with the least response to each rotation of a view."""
 
     def nearest(
         self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
@@ -164,16 +115,6 @@ class NearestFilters(Rotations):
         n, width = len(views), views.shape[2]
         least = views.new_full((n, width), torch.inf)
         index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
-        for some, first, responses in self.responses(views, among):
-            values, which = _least(responses)
-            less = values < least[some]
-            least[some] = values.where(less, least[some])
-            index[some] = (first + which).where(less, index[some])
-        return least[:, self.order], index[:, self.order]
-
-
-def _least(responses: Float32[torch.Tensor, "n w m"]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Least response over the filters (n, w), and its index. On a CPU by numpy, whose argmin is faster than torch's."""
-    on_cpu = responses.device.type == "cpu"
-    index = torch.from_numpy(responses.numpy().argmin(axis=2)) if on_cpu else responses.argmin(dim=2)
-    return responses.gather(2, index[..., None])[..., 0], index
+        for chunk in self._spectra.chunks(views, self._biases, among):
+            chunk.lower(least[chunk.views], index[chunk.views])
+        return least, index

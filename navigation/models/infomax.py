@@ -7,8 +7,9 @@ from tussock.world.settings import number, whole
 
 from .base import Images, Learned, Scans, Shapes, model
 from .checks import MAX_VALUE
-from .filter_bank import FilterBank, Rotations
+from .filter_bank import FilterBank
 from .incremental import IncrementalModel
+from .spectra import Spectra
 
 # Presets of the rate: eta / N of one update, for `units` units of `inputs` inputs.
 RATES = {
@@ -99,7 +100,7 @@ class Infomax(IncrementalModel):
 
     def _forget_banks(self) -> None:
         """The weights change: what scans need is made of them at the next one."""
-        self._rotations: Rotations | None = None
+        self._spectra: Spectra | None = None
         self._banks: list[FilterBank] | None = None
 
     def _scan(self, views: Images) -> Scans:
@@ -107,11 +108,11 @@ class Infomax(IncrementalModel):
         if self.mask is not None:
             self._banks = self._banks or [self._bank(some) for some in weights.split(UNITS)]
             return -sum(bank.responses(views).abs_().sum(dim=2) for bank in self._banks)  # type: ignore[return-value]
-        self._rotations = self._rotations or Rotations(weights)
+        self._spectra = self._spectra or Spectra(weights)
         activity = torch.zeros(len(views), views.shape[2], device=views.device)
-        for some, _, inputs in self._rotations.responses(views):
-            activity[some] += inputs.abs_().sum(dim=2)
-        return -activity[:, self._rotations.order]
+        for chunk in self._spectra.chunks(views):
+            activity[chunk.views] += chunk.absolute()
+        return -activity
 
 
 def infomax_update(

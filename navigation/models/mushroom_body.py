@@ -11,8 +11,10 @@ from torch.nn.functional import embedding_bag
 from tussock.world.errors import SettingError
 from tussock.world.settings import number, whole
 
+from ..threads import in_threads
 from .base import Images, Learned, Scans, Shapes, model
 from .filter_bank import FilterBank
+from .firing import largest_drives
 from .incremental import IncrementalModel
 from .rotations import smoothed
 
@@ -130,7 +132,7 @@ class MushroomBody(IncrementalModel):
             shares = fields.sum(dim=(1, 2))  # of the fields that are visible, 0 to 1
             fields = fields / torch.where(shares > 0, shares, 1)[:, None, None]
             self._shares = self._on_device(shares.reshape(self.rows, self.columns, 1))
-        return self._bank(self._on_device(fields))
+        return self._bank(self._on_device(fields.double()))  # so that neurons that see the same respond alike
 
     def _scan(self, views: Images) -> Scans:
         scans = []
@@ -148,7 +150,7 @@ class MushroomBody(IncrementalModel):
         there mean and contrast are those over the fields at an elevation, each weighted by the share of it that is visible, and
         neurons that see nothing are silent.
         """
-        averages = fields.responses(view[None])[0].T
+        averages = fields.responses(view[None])[0].T.contiguous()
         if self.mask is not None:
             return self._seen_projection(averages.unflatten(0, (self.rows, self.columns))).flatten(0, 1)
         contrast, mean = torch.std_mean(averages, dim=1, keepdim=True, correction=0)
@@ -165,9 +167,18 @@ class MushroomBody(IncrementalModel):
 
     def _firing(self, projections: Float32[torch.Tensor, "neurons n"], wiring: torch.Tensor) -> torch.Tensor:
         """Indices (n, firing) of the Kenyon cells that fire at each of n projections."""
-        n = projections.shape[1]
-        several = projections if n > 1 else projections.expand(-1, 2)  # for one, torch takes 20 times as long
-        return largest(embedding_bag(wiring, several.contiguous(), mode="sum")[:, :n], self.firing)
+        if projections.device.type != "cpu":
+            return largest(embedding_bag(wiring, projections.contiguous(), mode="sum"), self.firing)
+        cells = torch.empty(projections.shape[1], self.firing, dtype=torch.int64)
+        of_neurons, of_cells, chosen = projections.numpy(), wiring.numpy(), cells.numpy()
+        in_threads(
+            lambda begin, end: largest_drives(
+                np.ascontiguousarray(of_neurons[:, begin:end]), of_cells, chosen[begin:end]
+            ),
+            len(cells),
+            min(torch.get_num_threads(), len(cells)),
+        )
+        return cells
 
 
 def largest(drive: Float32[torch.Tensor, "cells n"], count: int) -> Int64[torch.Tensor, "n count"]:

@@ -17,9 +17,10 @@ from .filter_bank import FilterBank, NearestFilters
 from .growing import Growing
 from .incremental import IncrementalModel
 from .rotations import in_batches
-from .spectra import FILTERS
 
 Banks = list[tuple[FilterBank, Float64[torch.Tensor, " m"]]]
+
+FILTERS = 1000  # snapshots whose responses behind a mask are computed at once; limits the memory that this takes
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
 ROUNDING = 1e-6

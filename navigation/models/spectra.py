@@ -1,27 +1,20 @@
-"""Filters by their Fourier transforms along azimuth, and products of these with the transforms of views.
-
-A product of matrices by BLAS may depend, in its last bits, on how many rows there are: one view alone would be scanned to other bytes
-than among others. So on a CPU the products are computed here: each is summed in the order of the rows of the view, whatever the other
-views and filters are. This is as fast as BLAS for many views, and faster for few.
-"""
+"""Filters by their Fourier transforms along azimuth, and what comes of their responses to all rotations of views."""
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
+import numpy as np
 import torch
-from jaxtyping import Float
-
-from tussock.render.compile import compiled
+from jaxtyping import Float, Float64, Int64
 
 from ..threads import in_threads
-from .growing import Growing
-from .rotations import one_by_one
+from .growing import Tiles
+from .products import TILE, absolute, nearest, respond
 
-# Filters, and views, that are multiplied at once: what is computed on the way then stays in the processor's cache
-# (measured on an AMD EPYC with 1 MB of it per core).
-FILTERS, VIEWS = 1000, 16
-COLUMNS = 16  # to a multiple of which those of a product are filled up: all views' begin at a multiple of 64 bytes
-TERMS = 5  # of a sum that are added at once: numbers of rows are filled up to a multiple of it with 0
+# Filters that are stored together: this limits what is copied when others are added. Views that are multiplied at once: what is computed
+# on the way then stays in the processor's cache (measured on an AMD EPYC with 1 MB of it per core).
+FILTERS, VIEWS = 4096, 16
 SMALL = 2**23  # multiplications; below it, one thread is the quickest
 
 
@@ -34,6 +27,7 @@ class Spectra:
 
     def __init__(self, filters: Float[torch.Tensor, "m h w"]):
         self.width, self.size, self._blocks = filters.shape[2], FILTERS, []
+        self._inverse = tuple(each.to(filters) for each in inverse_transform(self.width))
         self._add(filters)
 
     def __len__(self) -> int:
@@ -48,86 +42,145 @@ class Spectra:
 
     def _add(self, filters: Float[torch.Tensor, "m h w"]) -> None:
         space = self.size - len(self._blocks[-1]) if self._blocks else 0
-        for block in (filters[:space], *filters[space:].split(self.size)):
-            if len(block) == 0:
-                continue
-            transformed = _columns(torch.fft.rfft(block))
-            if space:
-                self._blocks[-1] = self._blocks[-1].appended(transformed)
-            else:
-                self._blocks.append(Growing(transformed, dim=2))
-            space = 0
+        if space and len(filters):
+            self._blocks[-1] = self._blocks[-1].appended(torch.fft.rfft(filters[:space]))
+        self._blocks += [Tiles(torch.fft.rfft(some)) for some in filters[space:].split(self.size) if len(some)]
 
-    def products(
-        self, views: Float[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> Iterator[tuple[int, slice, Float[torch.Tensor, "2 views f columns"]]]:
-        """Products of views and filters at each frequency, summed over the rows: the transforms of the responses.
+    def chunks(
+        self,
+        views: Float[torch.Tensor, "n h w"],
+        biases: Float[torch.Tensor, " m"] | None = None,
+        among: slice = slice(None),
+    ) -> Iterator["Chunk"]:
+        """Some views and filters after the other, to compute what is wanted of their responses.
 
         Args:
             views: (n, h, w)
-            among: The filters to multiply.
-
-        Returns:
-            Of some views and filters after the other: the index of the first view, which filters, and the real and the imaginary
-            parts of their products (2, views, f, columns); columns after those of the filters are 0.
+            biases: (m,) Added to the responses; None means none.
+            among: The filters that respond.
         """
-        transformed = one_by_one(torch.fft.rfft, views)
-        # For each view two rows: Im(conj(V) F) is Re(conj(iV) F).
-        rows = _rows(torch.stack([transformed, 1j * transformed], dim=1).flatten(0, 1))
-        rows = rows.unflatten(1, (len(views), 2))  # (f, n, 2, 2 h)
+        rows = [_rows(some) for some in views.split(VIEWS)]
         start, stop, _ = among.indices(len(self))
-        for first, block in zip(range(0, stop, self.size), self._blocks, strict=False):
-            inside = max(start - first, 0), min(stop - first, len(block))
-            if inside[0] < inside[1]:
-                for view in range(0, len(views), VIEWS):
-                    some = rows[:, view : view + VIEWS].contiguous()
-                    yield view, slice(first + inside[0], first + inside[1]), _multiplied(some, block.storage, *inside)
+        for begin, block in zip(range(0, stop, self.size), self._blocks, strict=False):
+            first, last = max(start - begin, 0), min(stop - begin, len(block))
+            if first >= last:
+                continue
+            filters = slice(begin + first, begin + last)
+            added = views.new_zeros(last - first) if biases is None else biases[filters]
+            tiles = block.storage[first // TILE : -(-last // TILE)]
+            view = 0
+            for of_views in rows:
+                some = slice(view, view + of_views.shape[1] // 2)
+                yield Chunk(some, filters, of_views, self._inverse, tiles, added, first % TILE, self.width)
+                view = some.stop
 
 
-def _rows(spectra: torch.Tensor) -> Float[torch.Tensor, "f n parts"]:
-    """Real and imaginary parts of all rows of spectra (n, h, f), then as many 0 as make their number a multiple of TERMS."""
-    parts = torch.view_as_real(spectra).permute(2, 0, 1, 3).flatten(2)
-    return torch.nn.functional.pad(parts, (0, -parts.shape[2] % TERMS))
+@dataclass(frozen=True)
+class Chunk:
+    """Some views and filters whose products are computed at once.
+
+    Attributes:
+        views: Which views.
+        filters: Which filters.
+        rows: (f, 2 n, k) Of each view what gives the real parts of its products, then what gives the imaginary parts.
+        inverse: As `inverse_transform`.
+        tiles: Transforms of the filters, as `Tiles`.
+        biases: (m,) Added to the responses.
+        first: Where the first of the filters is in the tiles.
+        width: Number of rotations.
+    """
+
+    views: slice
+    filters: slice
+    rows: torch.Tensor
+    inverse: tuple[torch.Tensor, ...]
+    tiles: torch.Tensor
+    biases: torch.Tensor
+    first: int
+    width: int
+
+    def responses(self) -> Float[torch.Tensor, "n w m"]:
+        """Responses of the filters to all rotations of the views."""
+        if not self._compiled:
+            return self.by_torch()
+        responses = self.rows.new_empty(*self._shape, len(self.biases))
+        self._in_threads(lambda *arguments: respond(*arguments, responses.numpy()))
+        return responses
+
+    def lower(self, least: Float[torch.Tensor, "n w"], index: Int64[torch.Tensor, "n w"]) -> None:
+        """Where a response to a rotation of the views is below `least`, change it to the least one, and `index` to its filter."""
+        if not self._compiled:
+            values, which = self.by_torch().min(dim=2)
+            less = values < least
+            least[less], index[less] = values[less], self.filters.start + which[less]
+            return
+        found = {}
+
+        def work(*arguments) -> None:
+            own = np.full(self._shape, np.inf, np.float32), np.zeros(self._shape, np.int64)
+            nearest(*arguments, *own)
+            found[arguments[-2]] = own
+
+        self._in_threads(work)
+        for begin in sorted(found):
+            values, which = found[begin]
+            less = values < least.numpy()
+            least.numpy()[less], index.numpy()[less] = values[less], self.filters.start + which[less]
+
+    def absolute(self) -> Float[torch.Tensor, "n w"]:
+        """Sum of the absolute responses of the filters to each rotation of the views."""
+        if not self._compiled:
+            return self.by_torch().abs_().sum(dim=2)
+        sums = self.rows.new_empty(len(self.tiles), *self._shape)
+        self._in_threads(lambda *arguments: absolute(*arguments, sums.numpy()))
+        return sum(sums[1:], start=sums[0])
+
+    def by_torch(self) -> Float[torch.Tensor, "n w m"]:
+        """`responses` on any device. Sums may be rounded differently in another batch."""
+        products = torch.matmul(self.rows[:, None], self.tiles)  # (t, f, panels, 2 n, PANEL)
+        products = products.permute(1, 3, 0, 2, 4).flatten(2)
+        products = products[..., self.first : self.first + len(self.biases)].unflatten(1, (-1, 2))
+        spectra = torch.complex(*products.unbind(dim=2))  # (f, n, m)
+        return torch.fft.irfft(spectra, n=self.width, dim=0).movedim(0, 1) + self.biases
+
+    @property
+    def _compiled(self) -> bool:
+        return self.rows.device.type == "cpu"
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return self.rows.shape[1] // 2, self.width
+
+    def _in_threads(self, work: Callable[..., None]) -> None:
+        """Call `work` with the arguments of a compiled function of products.py up to `end`, for the tiles of each thread."""
+        inverse = tuple(each.numpy() for each in self.inverse)
+        arrays = self.rows.numpy(), inverse, self.tiles.numpy(), self.biases.numpy()
+        large = self.rows.numel() * len(self.tiles) * TILE >= SMALL
+        count = min(torch.get_num_threads(), len(self.tiles)) if large else 1
+        in_threads(lambda begin, end: work(*arrays, self.first, begin, end), len(self.tiles), count)
 
 
-def _columns(spectra: torch.Tensor) -> Float[torch.Tensor, "f parts m"]:
-    """The same for filters (m, h, f), each of which becomes a column. In two steps, as a plain transposition is much faster."""
-    parts = torch.view_as_real(spectra)  # (m, h, f, 2)
-    transposed = parts.flatten(1).T.contiguous().unflatten(0, parts.shape[1:]).transpose(0, 1)  # (f, h, 2, m)
-    return torch.nn.functional.pad(transposed.flatten(1, 2), (0, 0, 0, -2 * parts.shape[1] % TERMS))
+def _rows(views: Float[torch.Tensor, "n h w"]) -> Float[torch.Tensor, "f rows parts"]:
+    """For each view two rows: conj(V) F has the real part Re V Re F + Im V Im F, and the imaginary part Re V Im F - Im V Re F."""
+    on_cpu = views.device.type == "cpu"
+    # By numpy, which transforms each row by itself, and so to the same bytes in every batch.
+    transformed = torch.from_numpy(np.fft.rfft(views.numpy())) if on_cpu else torch.fft.rfft(views)
+    rows = torch.stack([transformed, 1j * transformed], dim=1)  # (n, 2, h, f)
+    return torch.view_as_real(rows.permute(3, 0, 1, 2).contiguous()).flatten(3).flatten(1, 2)
 
 
-def _multiplied(rows: torch.Tensor, filters: torch.Tensor, first: int, last: int) -> torch.Tensor:
-    """The product of matrices rows (f, n, 2, k) x filters (f, k, first to last) at each frequency, as (2, n, f, columns)."""
-    frequencies, n = rows.shape[:2]
-    if rows.device.type != "cpu":
-        products = torch.bmm(rows.flatten(1, 2), filters[:, :, first:last])
-        products = products.unflatten(1, (n, 2)).permute(2, 1, 0, 3)
-        return torch.nn.functional.pad(products, (0, (first - last) % COLUMNS))
-    products = torch.empty(2, n, frequencies, last - first + (first - last) % COLUMNS, dtype=rows.dtype)
-    arrays = rows.numpy(), filters.numpy(), first, last, products.numpy()
-    large = rows.numel() * (last - first) >= SMALL
-    in_threads(lambda begin, end: _multiply(*arrays, begin, end), frequencies, torch.get_num_threads() if large else 1)
-    return products
+def inverse_transform(width: int) -> tuple[Float64[torch.Tensor, "2 i even"], Float64[torch.Tensor, "2 i odd"]]:
+    """What makes responses of the real parts of products, and of the imaginary parts, at rotations 0, 1, ..
 
-
-@compiled(fastmath={"contract"})
-def _multiply(rows, filters, first, last, products, begin, end):
-    """The same for frequencies `begin` to `end`. Loops are unrolled: a number, once loaded, is used for two rows and TERMS terms."""
-    n, m = products.shape[1], last - first
-    products[:, :, begin:end] = 0
-    for f in range(begin, end):
-        for k in range(0, rows.shape[3], TERMS):
-            f0 = filters[f, k, first:last]
-            f1 = filters[f, k + 1, first:last]
-            f2 = filters[f, k + 2, first:last]
-            f3 = filters[f, k + 3, first:last]
-            f4 = filters[f, k + 4, first:last]
-            for v in range(n):
-                real, imaginary = products[0, v, f], products[1, v, f]
-                a, b = rows[f, v, 0, k : k + TERMS], rows[f, v, 1, k : k + TERMS]
-                a0, a1, a2, a3, a4 = a[0], a[1], a[2], a[3], a[4]
-                b0, b1, b2, b3, b4 = b[0], b[1], b[2], b[3], b[4]
-                for j in range(m):
-                    real[j] = real[j] + a0 * f0[j] + a1 * f1[j] + a2 * f2[j] + a3 * f3[j] + a4 * f4[j]
-                    imaginary[j] = imaginary[j] + b0 * f0[j] + b1 * f1[j] + b2 * f2[j] + b3 * f3[j] + b4 * f4[j]
+    The first is for frequencies of even numbers, and the second for those of odd numbers. They are for rotations 0 to w // 4: by their
+    sum and their difference the others are known. Where w is odd, the first is for all frequencies and rotations 0 to w // 2, and the
+    second for none. Rows are filled up with 0 to an even number.
+    """
+    count = width // 2 + 1
+    identity = torch.eye(count, dtype=torch.float64)
+    whole = torch.stack([torch.fft.irfft(parts, n=width, dim=0) for parts in (identity, 1j * identity)])
+    of_even, of_odd = (whole[..., ::2], whole[..., 1::2]) if width % 2 == 0 else (whole, whole[..., :0])
+    rotations = width // 4 + 1 if width % 2 == 0 else count
+    padding = (0, 0, 0, rotations % 2)
+    even, odd = (torch.nn.functional.pad(each[:, :rotations], padding).contiguous() for each in (of_even, of_odd))
+    return even, odd
