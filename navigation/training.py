@@ -17,6 +17,7 @@ from .encoding import Encoding
 from .feature_mask import FeatureMask, seeing
 from .models.base import FamiliarityModel, Images
 from .models.files import TrainedModel
+from .threads import one_torch_thread
 
 log = logging.getLogger(__name__)
 
@@ -133,13 +134,14 @@ def training_views(
     images, kept, source = [], [], training_source(renderer)
     encoded = encoding.for_eye(renderer.eye)
     encoded.remark_on_overlap()
-    for start in range(0, len(poses), BATCH):
-        part = poses[start : start + BATCH]
-        batch = encoded.at(source, part)
-        worth = _contrast(batch, encoded.mask) > MIN_CONTRAST
-        images.append(batch[worth])
-        kept.append(part[worth.numpy()])
-        progress(min(start + BATCH, len(poses)), len(poses))
+    with one_torch_thread():
+        for start in range(0, len(poses), BATCH):
+            part = poses[start : start + BATCH]
+            batch = encoded.at(source, part)
+            worth = _contrast(batch, encoded.mask) > MIN_CONTRAST
+            images.append(batch[worth])
+            kept.append(part[worth.numpy()])
+            progress(min(start + BATCH, len(poses)), len(poses))
     if not sum(map(len, kept)):
         raise SettingError(
             f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})"

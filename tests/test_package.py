@@ -26,6 +26,7 @@ def test_public_names_are_listed_and_can_be_loaded(room):
 
 HEAVY = "distributed matplotlib numba numpy pandas pyarrow rerun scipy sklearn torch trimesh"
 OF_FIGURES_AND_MODELS = "distributed matplotlib pandas pyarrow rerun sklearn torch"
+WITHOUT_FIGURES = "distributed matplotlib pandas pyarrow rerun sklearn trimesh"
 TINY = "--world tiny --size 60x12"
 
 
@@ -64,7 +65,11 @@ def test_importing_tussock_loads_nothing_heavy():
         (f"view {TINY}", OF_FIGURES_AND_MODELS),
         ("route --world tiny --length-m 1", OF_FIGURES_AND_MODELS),
         (f"database route {TINY} --route-length-m 1 --spacing-m 0.5 --out d", OF_FIGURES_AND_MODELS),
+        (f"evaluate {TINY} --route-length-m 1 --grid-m 0.5", WITHOUT_FIGURES),
+        (f"train {TINY} --route-length-m 1 --spacing-m 0.2", WITHOUT_FIGURES),
         (f"run {TINY} --route-length-m 1 --spacing-m 0.2", "distributed sklearn trimesh"),
+        (f"run {TINY} --live --viewer rerun+http://127.0.0.1:1/proxy", WITHOUT_FIGURES),  # nothing listens there
+        ("play nothing", HEAVY),
     ],
 )
 def test_a_command_loads_nothing_heavy_that_it_does_not_need(arguments, unneeded, tmp_path):

@@ -1,4 +1,7 @@
-"""A run's folder: the recording of a walk, its trajectory, summary and picture."""
+"""A run's folder: the recording of a walk, its trajectory, summary and picture.
+
+rerun and matplotlib are imported where they are used: a run that is refused needs neither.
+"""
 
 import json
 import os
@@ -15,9 +18,7 @@ from tussock.world.route_files import write_route
 
 from ..experiment import Experiment, TrainedNavigator
 from ..experiment_settings import run_command, settings_of
-from ..reports.maps import write_overview
 from ..trajectory import Trajectory
-from .log import Recording
 from .playback import RECORDING, UNFINISHED
 from .viewer import check_viewer
 
@@ -69,6 +70,8 @@ def record_run(
         title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
         renderer = trained.renderer
         views = renderer.poses[:, :2] if isinstance(renderer, DatabaseViews) else None
+        from ..reports.maps import write_overview
+
         write_overview(renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, views=views, title=title)
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
@@ -86,6 +89,8 @@ def _record(
     walking: Progress,
 ) -> tuple[Trajectory, float]:
     """Walk, and record each step as it is made; returns the trajectory and the seconds."""
+    from .log import Recording
+
     trajectory, began = Trajectory(), time.perf_counter()
     limit = experiment.stopping.step_limit(trained.route.length, experiment.body.step_length)
     with Recording(

@@ -11,8 +11,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from rerun.experimental import ViewerClient
-
 from tussock.world.atomic import replacing
 from tussock.world.errors import MissingDependencyError
 
@@ -39,6 +37,8 @@ def save_screenshot(recording: Path, picture: Path, *, seconds: float = 60.0) ->
     Raises:
         MissingDependencyError: Where the viewer cannot draw, or needs longer.
     """
+    from rerun.experimental import ViewerClient  # late: `watch` needs only the viewer's program
+
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
