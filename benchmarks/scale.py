@@ -133,7 +133,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--runs", type=int, default=100_000)
-    parser.add_argument("--only", default="", help="stages, by the first words of their names, with commas between them")
+    parser.add_argument(
+        "--only", default="", help="stages, by the first words of their names, with commas between them"
+    )
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     path, out = sweep_file(options.folder, options.runs), options.folder / "out"

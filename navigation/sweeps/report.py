@@ -17,7 +17,7 @@ from ..reports.report import RESULTS as REPLICATION_RESULTS
 from ..reports.results import plain_json
 from .figures import along_axis
 from .statistics import MEASURES, Interval, axes_of, by_axis, choice_label, means, pairings, setting_label
-from .store import Store, read_steps, table_of
+from .store import Store, read_steps
 from .sweep import worst_of
 from .worst import walk_section
 
@@ -56,15 +56,14 @@ def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_
     if (folder / REPLICATION_RESULTS).exists():
         raise FileError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
     with Store(folder, read_only=True) as store:
-        rows = store.rows()
-        if not rows:
+        table = store.table()
+        if table.empty:
             raise FileError(f"{folder} holds no finished run yet; try again later")
-        shown = worst_of(rows, worst)
+        shown = worst_of(table, worst)
         walks = [
-            walk_section(number, key, rows[key], read_steps(store.steps(key)), folder)
+            walk_section(number, key, store.row(key), read_steps(store.steps(key)), folder)
             for number, key in enumerate(shown, 1)
         ]
-    table = table_of(rows)
     completed = table[table["error"].isna()].reset_index(drop=True)
     if completed.empty:
         raise FileError(f"no run in {folder} could be completed; the first: {table['error'].iloc[0]}")
