@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tussock.navigation.experiment_keys import key_of
+from tussock.navigation.experiment_keys import Keys
 from tussock.navigation.failures import Cause
 from tussock.navigation.sweeps.report import write_sweep_report
 from tussock.navigation.sweeps.store import Store
@@ -70,14 +70,14 @@ def fill(path: Path, out: Path, runs: int) -> None:
     """Keep made-up results of the first runs that a sweep file asks for, as a sweep keeps them."""
     rng = np.random.default_rng(0)
     steps = [steps_text(rng) for _ in range(20)]
-    experiments = islice(read_sweep(path).experiments, runs)
+    keys, experiments = Keys(), islice(read_sweep(path).experiments, runs)
     with Store(out) as store:
         while part := list(islice(experiments, TOGETHER)):
             walked = [
                 Walked(results=made_up(rng), steps=steps[rng.integers(20)], seconds=2.0, learn_seconds=4.0)
                 for _ in part
             ]
-            store.add(finished_run(run, key_of(run), each) for run, each in zip(part, walked, strict=True))
+            store.add(finished_run(run, keys.run(run), each) for run, each in zip(part, walked, strict=True))
 
 
 def read(path: Path, out: Path) -> None:
@@ -85,8 +85,9 @@ def read(path: Path, out: Path) -> None:
 
 
 def keys(path: Path, out: Path) -> None:
+    made = Keys()
     for run in read_sweep(path).experiments:
-        key_of(run)
+        made.run(run)
 
 
 def group(path: Path, out: Path) -> None:

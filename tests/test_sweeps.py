@@ -1,6 +1,7 @@
 """Sweeps: what a file asks for, the same table from any cluster, and nothing lost whatever is killed."""
 
 import io
+import itertools
 import json
 import os
 import shlex
@@ -26,7 +27,7 @@ from PIL import Image
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
-from tussock.navigation.experiment_keys import key_of, training_key
+from tussock.navigation.experiment_keys import Keys, key_of, route_key, training_key, views_key
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
@@ -308,6 +309,38 @@ def test_a_sweep_is_all_combinations_of_its_choices(tmp_path):
         ("tiny", "60x12", 90.0, 1)
     }
     assert str(sweep) == "2 of learner, 3 of offset_m, 3 of seed, 1 of scan_deg"
+
+
+def test_parts_that_runs_share_are_checked_once_and_put_together_right(tmp_path, monkeypatch):
+    """Also where the choices of an axis change the walk and other things, and the axes of walks are not the last ones."""
+    text = (
+        HEAD + "offset-m = 0.05\n[axes]\nstep-m = [0.05, 0.1]\nmodel = ['random', 'infomax']\n"
+        "who = [{encoding = 'grey', lost-m = 0.4}, {encoding = 'sky', lost-m = 0.3}]\nheading-noise-deg = [0, 5, 10, 20]\n"
+    )
+    made = []
+    monkeypatch.setattr(
+        "tussock.navigation.sweeps.sweep_file.experiment_of", lambda *given: made.append(0) or experiment_of(*given)
+    )
+    sweep = read_sweep(written(tmp_path, text))
+    fixed = {"world": "tiny", "size": "60x12", "spacing_m": 0.1, "offset_m": 0.05, "threads": 1}
+    axes = {"step_m": (0.05, 0.1), "model": ("random", "infomax"), "who": (("grey", 0.4), ("sky", 0.3))}
+    given = [
+        fixed | {"step_m": step, "model": model, "encoding": who[0], "lost_m": who[1], "heading_noise_deg": noise}
+        for step, model, who, noise in itertools.product(*axes.values(), (0.0, 5.0, 10.0, 20.0))
+    ]
+    assert list(sweep.experiments) == [experiment_of(each) for each in given]
+    assert len(made) <= 2 * 2 + 2 * 2 * 4
+    keys = Keys()
+    for run in sweep.experiments:
+        assert keys.run(run) == key_of(run)
+        assert keys.shared(run) == (route_key(run), views_key(run), training_key(run))
+
+
+def test_keys_of_experiments_that_are_gone_are_not_mistaken_for_those_of_others():
+    keys = Keys()
+    for seed in range(300):  # each is made where one before it was in memory
+        run = ALONE.replace(seed=1000 + seed, start_offset=seed / 1000)
+        assert keys.run(run) == key_of(run)
 
 
 @pytest.mark.parametrize(

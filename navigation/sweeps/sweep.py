@@ -23,7 +23,7 @@ from tussock.world.errors import FileError, InputError, MissingDependencyError, 
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
-from ..experiment_keys import key_of, route_key, training_key, views_key
+from ..experiment_keys import Keys, route_key, training_key, views_key
 from ..experiment_settings import TYPES, run_command, settings_of
 from ..recording.run_folder import record_run
 from . import work
@@ -68,7 +68,7 @@ def run_sweep(
         InputError: Where another sweep writes to the folder, and where runs could not be finished; all others are kept.
     """
     began = time.perf_counter()
-    runs = {key_of(run): run for run in sweep.experiments}
+    runs = _by_key(sweep)
     with Store(out) as store:
         store.check_settings(TYPES)
         finished = store.finished()
@@ -96,7 +96,7 @@ def run_sweep(
 
 def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
     """Keep recordings of the worst runs of a finished sweep; returns their folders. Raises InputError as `record_again` does."""
-    runs = {key_of(run): run for run in sweep.experiments}
+    runs = _by_key(sweep)
     with Store(out) as store:
         table = store.table()
         worst = worst_of(table[table["key"].isin(runs)], count)
@@ -106,6 +106,11 @@ def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
         finally:
             _write_table(store, out)
     return [out / WORST / key for key in worst]
+
+
+def _by_key(sweep: Sweep) -> dict[str, Experiment]:
+    keys = Keys()
+    return {keys.run(run): run for run in sweep.experiments}
 
 
 def _run(
@@ -181,8 +186,9 @@ def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
     """Which runs walk together, as keys: runs of one trained model, so many that all workers are busy. One world after the other."""
     groups: dict[tuple[str, ...], list[str]] = {}
     first: dict[str, int] = {}  # when a world, views and a model are first needed
+    keys = Keys()
     for key, run in runs.items():
-        names = route_key(run), views_key(run), training_key(run)
+        names = keys.shared(run)
         groups.setdefault(names, []).append(key)
         for name in names:
             first.setdefault(name, len(first))
