@@ -338,9 +338,9 @@ def test_parts_that_runs_share_are_checked_once_and_put_together_right(tmp_path,
 
 def test_keys_of_experiments_that_are_gone_are_not_mistaken_for_those_of_others():
     keys = Keys()
-    for seed in range(300):  # each is made where one before it was in memory
-        run = ALONE.replace(seed=1000 + seed, start_offset=seed / 1000)
-        assert keys.run(run) == key_of(run)
+    for millimetres in range(1, 300):  # an eye is made where one before it was in memory
+        change = {"eye__z": millimetres / 1000}
+        assert keys.run(ALONE.replace(**change)) == key_of(ALONE.replace(**change))
 
 
 @pytest.mark.parametrize(
