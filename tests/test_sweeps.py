@@ -38,10 +38,10 @@ from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, 
 from tussock.navigation.sweeps.sweep import MAX_TOGETHER, finished_run, record_again, run_sweep, side_by_side
 from tussock.navigation.sweeps.sweep_file import read_sweep
 from tussock.navigation.sweeps.work import Walked, draw, learn, walk
-from tussock.navigation.sweeps.worst import walk_section
+from tussock.navigation.sweeps.worst import learned_pose, walk_section
 from tussock.navigation.trajectory import Trajectory
 from tussock.render.eye import Eye
-from tussock.world.errors import InputError
+from tussock.world.errors import InputError, SettingError
 
 HEAD = '[fixed]\nworld = "tiny"\nsize = "60x12"\nspacing-m = 0.1\n'
 SWEEP = HEAD + '[axes]\nmodel = ["perfect-memory", "infomax"]\nseed = { from = 0, to = 3 }\noffset-m = [-0.1, 0, 0.1]\n'
@@ -691,6 +691,28 @@ def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):
     drawing = next(block for block in section.blocks if isinstance(block, Drawing))
     with pytest.raises(InputError, match=r"gone\.glb"):
         list(drawing.draw())
+
+
+@pytest.mark.parametrize("hidden", [set(), {0}, {0, 1, 5}])
+def test_the_pose_of_a_learned_view_counts_views_without_contrast_out(monkeypatch, hidden):
+    """Also where all views before it are without contrast. No more are drawn than it takes."""
+    drawn = []
+
+    def training_views(encoding, renderer, poses):
+        drawn.append(len(poses))
+        learned = poses[[k not in hidden for k in range(len(poses))]]
+        if not len(learned):
+            raise SettingError("none")
+        return None, learned
+
+    monkeypatch.setattr("tussock.navigation.sweeps.worst.training_views", training_views)
+    poses = np.arange(30.0).reshape(10, 3)
+    kept = [k for k in range(10) if k not in hidden]
+    with ALONE.open_renderer(ALONE.open_world()) as renderer:
+        for number, k in enumerate(kept):
+            drawn.clear()
+            assert np.array_equal(learned_pose(number, ALONE, renderer, poses), poses[[k]])
+            assert max(drawn) == k + 1
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -178,7 +178,7 @@ def ranges_of(table: pd.DataFrame, names: list[str]) -> pd.Categorical | None:
 def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[str], axis: list[str]) -> list[Pairing]:
     """Every two choices of an axis, compared on the runs for which all other settings are equal."""
     others = [name for name in table.columns.intersection(settings, sort=False) if name not in axis]
-    rest = [name for name in others if table[name].nunique(dropna=False) > 1] or others
+    rest = [name for name in others if len(table[name].unique()) > 1] or others
     parts = {choice_label(key): part for key, part in table.groupby(axis, dropna=False, sort=True)}
     results = []
     for first, second in combinations(parts, 2):
