@@ -152,7 +152,8 @@ class Store:
 
 def _packed(run: Finished) -> tuple[str, str, str, bytes, bool]:
     """A run as a row of the database."""
-    return run.key, json.dumps(run.settings), json.dumps(run.row), zlib.compress(run.steps.encode()), run.again
+    steps = zlib.compress(run.steps.encode(), level=1)  # of digits: higher levels gain 3 % in three times the time
+    return run.key, json.dumps(run.settings), json.dumps(run.row), steps, run.again
 
 
 def _locked(folder: Path) -> FileLock:
