@@ -12,6 +12,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+import tracemalloc
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, redirect_stdout
@@ -24,6 +25,7 @@ import pytest
 from browser import WIDTHS, in_browser
 from commands import TUSSOCK, printed, process_json, tussock
 from PIL import Image
+from scale import fill, sweep_file
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
@@ -33,6 +35,7 @@ from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.reports.report import Drawing
+from tussock.navigation.sweeps.report import write_sweep_report
 from tussock.navigation.sweeps.spec import Sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
 from tussock.navigation.sweeps.sweep import MAX_TOGETHER, finished_run, record_again, run_sweep, side_by_side
@@ -147,6 +150,48 @@ def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
     }
     shuffled = dict(np.random.default_rng(0).permutation(list(rows.items())).tolist())
     assert table_of(shuffled).equals(table_of(rows))
+
+
+def test_the_table_does_not_depend_on_the_parts_in_which_rows_are_read(monkeypatch):
+    """Where a whole part has no value, or only whole numbers of a column of numbers, and where runs have no results."""
+    rows = {
+        f"{k:02}": {"seed": k, "scale": None if k < 7 else k / 2, "unit": k if k < 9 else k / 2, "error": None}
+        | ({"arrived": k > 12, "steps": k, "cause": "corner" if k == 15 else None} if k > 3 else {"error": "no world"})
+        for k in range(20)
+    }
+    whole = table_of(rows)
+    assert whole["steps"].dtype == "Int64"
+    assert [whole[name].dtype for name in ("scale", "unit")] == ["float64"] * 2
+    assert list(whole) == ["key", *rows["10"]]
+    monkeypatch.setattr("tussock.navigation.sweeps.store.PART", 3)
+    pd.testing.assert_frame_equal(table_of(dict(reversed(rows.items()))), whole)
+
+
+def test_the_table_of_many_runs_takes_a_fraction_of_the_memory_of_their_rows(tmp_path, monkeypatch):
+    monkeypatch.setattr("tussock.navigation.sweeps.store.PART", 100)
+    with Store(tmp_path) as store:
+        settings = settings_of(ALONE)
+        store.add([kept(str(seed), settings | {"seed": seed}, mean_deviation_m=seed / 7) for seed in range(3000)])
+        peaks = {}
+        for read in (store.table, store.rows, store.table):
+            tracemalloc.start()
+            assert len(read()) == 3000
+            peaks[read.__name__] = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+    assert peaks["table"] < peaks["rows"] / 4
+
+
+def test_no_steps_are_read_to_find_out_which_runs_are_finished(tmp_path):
+    with Store(tmp_path) as store:
+        plans = []
+        store._database.set_trace_callback(plans.append)
+        store.finished()
+        store._database.set_trace_callback(None)
+        (query,) = plans
+        steps = [row[3] for row in store._database.execute(f"EXPLAIN QUERY PLAN {query}")]
+    scans = [step for step in steps if step.startswith(("SCAN", "SEARCH"))]
+    assert len(scans) == 2
+    assert all("INDEX" in scan for scan in scans)
 
 
 # Runs that walk together
@@ -691,6 +736,23 @@ def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):
     drawing = next(block for block in section.blocks if isinstance(block, Drawing))
     with pytest.raises(InputError, match=r"gone\.glb"):
         list(drawing.draw())
+
+
+def test_an_axis_with_very_many_choices_is_reported_in_ranges(tmp_path, monkeypatch):
+    """The page and the numbers stay small. An interval of a range is that of its runs."""
+    fill(sweep_file(tmp_path, 200), tmp_path / "out", 200)
+    whole = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]
+    monkeypatch.setattr("tussock.navigation.sweeps.statistics.MAX_CHOICES", 9)
+    monkeypatch.setattr("tussock.navigation.sweeps.statistics.RANGES", 3)
+    ranges = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]
+    labels = list(whole)
+    assert list(ranges) == [f"{labels[a]} to {labels[b]}" for a, b in ((0, 3), (4, 6), (7, 9))]
+    with Store(tmp_path / "out", read_only=True) as store:
+        table = store.table()
+    first = table[table["offset_m"] < -0.06]
+    assert ranges[f"{labels[0]} to {labels[3]}"]["runs"] == len(first) == 80
+    assert ranges[f"{labels[0]} to {labels[3]}"]["arrived"]["value"] == first["arrived"].mean()
+    assert "a range of successive ones" in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize("hidden", [set(), {0}, {0, 1, 5}])

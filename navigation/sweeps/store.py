@@ -30,7 +30,7 @@ _TABLES = """
 _COLUMNS = ("key", "settings", "row", "steps", "again")
 TIMES = ("seconds", "learn_seconds")  # columns of the table that no two sweeps have alike
 PATIENCE = 600  # s that a sweep waits for one who reads its folder
-PART = 5000  # rows that are in memory as objects, which take ten times as much as columns
+PART = 1000  # rows that are in memory as objects, which take ten times as much as columns
 KINDS = {
     pa.null(): pd.StringDtype(),
     pa.string(): pd.StringDtype(),
