@@ -155,8 +155,12 @@ def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
 def test_the_table_does_not_depend_on_the_parts_in_which_rows_are_read(monkeypatch):
     """Where a whole part has no value, or only whole numbers of a column of numbers, and where runs have no results."""
     rows = {
-        f"{k:02}": {"seed": k, "scale": None if k < 7 else k / 2, "unit": k if k < 9 else k / 2, "error": None}
-        | ({"arrived": k > 12, "steps": k, "cause": "corner" if k == 15 else None} if k > 3 else {"error": "no world"})
+        f"{k:02}": {"seed": k, "scale": None if k < 7 else k / 2, "unit": k if k < 9 else k / 2}
+        | (
+            {"arrived": k > 12, "steps": k, "cause": "corner" if k == 15 else None, "error": None}
+            if k > 3
+            else {"error": "no world"}
+        )
         for k in range(20)
     }
     whole = table_of(rows)
