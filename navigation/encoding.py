@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import attrs
@@ -241,10 +242,15 @@ def describe_encoding(encoding: Encoding, eye: Eye) -> tuple[str, float | None, 
     """An encoding in short: a preset's name, its resize (None: automatic) and blur; else the whole chain."""
     blur = next((step.sigma for step in encoding.steps if isinstance(step, Blur)), 0.0)
     resize = next((step.factor for step in encoding.steps if isinstance(step, Resize)), 1.0)
-    for name in PRESETS:
-        if Encoding.named(name, resize=resize, blur=blur) == encoding:
+    for name, preset in _presets(resize, blur).items():
+        if preset == encoding:
             return name, None if resize == automatic_resize(eye) else resize, blur
     return str(encoding), None, 0.0
+
+
+@lru_cache  # the runs of a sweep have few
+def _presets(resize: float, blur: float) -> dict[str, Encoding]:
+    return {name: Encoding.named(name, resize=resize, blur=blur) for name in PRESETS}
 
 
 def format_number(number: float) -> str:

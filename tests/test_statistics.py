@@ -62,6 +62,25 @@ def test_runs_in_one_world_are_one_group():
     assert groups == [0, 0, 0, 0, 1, 1, 2, 3, 2, 3, 2, 3, 4, 4, 4, 4, 4, 4]
 
 
+@pytest.mark.parametrize("shape", ["share", "skewed"])
+def test_the_interval_of_many_groups_is_that_of_the_bootstrap(monkeypatch, shape):
+    """Up to a small part of its width, for groups of different sizes."""
+    random = np.random.default_rng(0)
+    groups = random.integers(0, 1500, 6000)
+    values = random.random(6000) < 0.7 if shape == "share" else random.gamma(2, 0.05, 6000) + 0.1 * (groups % 2)
+    drawn = mean_interval(values.astype(float), groups)
+    monkeypatch.setattr("tussock.navigation.sweeps.statistics.MAX_GROUPS", 1000)
+    normal = mean_interval(values.astype(float), groups)
+    assert normal.value == drawn.value
+    assert normal.low != drawn.low
+    assert np.allclose([normal.low, normal.high], [drawn.low, drawn.high], rtol=0, atol=0.05 * (drawn.high - drawn.low))
+
+
+def test_the_interval_of_a_share_ends_at_one():
+    interval = mean_interval(np.r_[0.0, np.ones(5000)], np.arange(5001))
+    assert interval.low < interval.value < interval.high <= 1
+
+
 def test_many_groups_need_little_memory():
     tracemalloc.start()
     mean_interval(np.ones(30_000), np.arange(30_000))

@@ -1,6 +1,7 @@
 """Sweeps: what a file asks for, the same table from any cluster, and nothing lost whatever is killed."""
 
 import io
+import itertools
 import json
 import os
 import shlex
@@ -11,6 +12,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+import tracemalloc
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, redirect_stdout
@@ -23,24 +25,26 @@ import pytest
 from browser import WIDTHS, in_browser
 from commands import TUSSOCK, printed, process_json, tussock
 from PIL import Image
+from scale import fill, sweep_file
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
-from tussock.navigation.experiment_keys import key_of, training_key
+from tussock.navigation.experiment_keys import Keys, key_of, route_key, training_key, views_key
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.reports.report import Drawing
+from tussock.navigation.sweeps.report import write_sweep_report
 from tussock.navigation.sweeps.spec import Sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
 from tussock.navigation.sweeps.sweep import MAX_TOGETHER, finished_run, record_again, run_sweep, side_by_side
 from tussock.navigation.sweeps.sweep_file import read_sweep
 from tussock.navigation.sweeps.work import Walked, draw, learn, walk
-from tussock.navigation.sweeps.worst import walk_section
+from tussock.navigation.sweeps.worst import learned_pose, walk_section
 from tussock.navigation.trajectory import Trajectory
 from tussock.render.eye import Eye
-from tussock.world.errors import InputError
+from tussock.world.errors import InputError, SettingError
 
 HEAD = '[fixed]\nworld = "tiny"\nsize = "60x12"\nspacing-m = 0.1\n'
 SWEEP = HEAD + '[axes]\nmodel = ["perfect-memory", "infomax"]\nseed = { from = 0, to = 3 }\noffset-m = [-0.1, 0, 0.1]\n'
@@ -146,6 +150,52 @@ def test_the_table_does_not_depend_on_the_order_in_which_runs_finish():
     }
     shuffled = dict(np.random.default_rng(0).permutation(list(rows.items())).tolist())
     assert table_of(shuffled).equals(table_of(rows))
+
+
+def test_the_table_does_not_depend_on_the_parts_in_which_rows_are_read(monkeypatch):
+    """Where a whole part has no value, or only whole numbers of a column of numbers, and where runs have no results."""
+    rows = {
+        f"{k:02}": {"seed": k, "scale": None if k < 7 else k / 2, "unit": k if k < 9 else k / 2}
+        | (
+            {"arrived": k > 12, "steps": k, "cause": "corner" if k == 15 else None, "error": None}
+            if k > 3
+            else {"error": "no world"}
+        )
+        for k in range(20)
+    }
+    whole = table_of(rows)
+    assert whole["steps"].dtype == "Int64"
+    assert [whole[name].dtype for name in ("scale", "unit")] == ["float64"] * 2
+    assert list(whole) == ["key", *rows["10"]]
+    monkeypatch.setattr("tussock.navigation.sweeps.store.PART", 3)
+    pd.testing.assert_frame_equal(table_of(dict(reversed(rows.items()))), whole)
+
+
+def test_the_table_of_many_runs_takes_a_fraction_of_the_memory_of_their_rows(tmp_path, monkeypatch):
+    monkeypatch.setattr("tussock.navigation.sweeps.store.PART", 100)
+    with Store(tmp_path) as store:
+        settings = settings_of(ALONE)
+        store.add([kept(str(seed), settings | {"seed": seed}, mean_deviation_m=seed / 7) for seed in range(3000)])
+        peaks = {}
+        for read in (store.table, store.rows, store.table):
+            tracemalloc.start()
+            assert len(read()) == 3000
+            peaks[read.__name__] = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+    assert peaks["table"] < peaks["rows"] / 4
+
+
+def test_no_steps_are_read_to_find_out_which_runs_are_finished(tmp_path):
+    with Store(tmp_path) as store:
+        plans = []
+        store._database.set_trace_callback(plans.append)
+        store.finished()
+        store._database.set_trace_callback(None)
+        (query,) = plans
+        steps = [row[3] for row in store._database.execute(f"EXPLAIN QUERY PLAN {query}")]
+    scans = [step for step in steps if step.startswith(("SCAN", "SEARCH"))]
+    assert len(scans) == 2
+    assert all("INDEX" in scan for scan in scans)
 
 
 # Runs that walk together
@@ -308,6 +358,38 @@ def test_a_sweep_is_all_combinations_of_its_choices(tmp_path):
         ("tiny", "60x12", 90.0, 1)
     }
     assert str(sweep) == "2 of learner, 3 of offset_m, 3 of seed, 1 of scan_deg"
+
+
+def test_parts_that_runs_share_are_checked_once_and_put_together_right(tmp_path, monkeypatch):
+    """Also where the choices of an axis change the walk and other things, and the axes of walks are not the last ones."""
+    text = (
+        HEAD + "offset-m = 0.05\n[axes]\nstep-m = [0.05, 0.1]\nmodel = ['random', 'infomax']\n"
+        "who = [{encoding = 'grey', lost-m = 0.4}, {encoding = 'sky', lost-m = 0.3}]\nheading-noise-deg = [0, 5, 10, 20]\n"
+    )
+    made = []
+    monkeypatch.setattr(
+        "tussock.navigation.sweeps.sweep_file.experiment_of", lambda *given: made.append(0) or experiment_of(*given)
+    )
+    sweep = read_sweep(written(tmp_path, text))
+    fixed = {"world": "tiny", "size": "60x12", "spacing_m": 0.1, "offset_m": 0.05, "threads": 1}
+    axes = {"step_m": (0.05, 0.1), "model": ("random", "infomax"), "who": (("grey", 0.4), ("sky", 0.3))}
+    given = [
+        fixed | {"step_m": step, "model": model, "encoding": who[0], "lost_m": who[1], "heading_noise_deg": noise}
+        for step, model, who, noise in itertools.product(*axes.values(), (0.0, 5.0, 10.0, 20.0))
+    ]
+    assert list(sweep.experiments) == [experiment_of(each) for each in given]
+    assert len(made) <= 2 * 2 + 2 * 2 * 4
+    keys = Keys()
+    for run in sweep.experiments:
+        assert keys.run(run) == key_of(run)
+        assert keys.shared(run) == (route_key(run), views_key(run), training_key(run))
+
+
+def test_keys_of_experiments_that_are_gone_are_not_mistaken_for_those_of_others():
+    keys = Keys()
+    for millimetres in range(1, 300):  # an eye is made where one before it was in memory
+        change = {"eye__z": millimetres / 1000}
+        assert keys.run(ALONE.replace(**change)) == key_of(ALONE.replace(**change))
 
 
 @pytest.mark.parametrize(
@@ -658,6 +740,45 @@ def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):
     drawing = next(block for block in section.blocks if isinstance(block, Drawing))
     with pytest.raises(InputError, match=r"gone\.glb"):
         list(drawing.draw())
+
+
+def test_an_axis_with_very_many_choices_is_reported_in_ranges(tmp_path, monkeypatch):
+    """The page and the numbers stay small. An interval of a range is that of its runs."""
+    fill(sweep_file(tmp_path, 200), tmp_path / "out", 200)
+    whole = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]
+    monkeypatch.setattr("tussock.navigation.sweeps.statistics.MAX_CHOICES", 9)
+    monkeypatch.setattr("tussock.navigation.sweeps.statistics.RANGES", 3)
+    ranges = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]
+    labels = list(whole)
+    assert list(ranges) == [f"{labels[a]} to {labels[b]}" for a, b in ((0, 3), (4, 6), (7, 9))]
+    with Store(tmp_path / "out", read_only=True) as store:
+        table = store.table()
+    first = table[table["offset_m"] < -0.06]
+    assert ranges[f"{labels[0]} to {labels[3]}"]["runs"] == len(first) == 80
+    assert ranges[f"{labels[0]} to {labels[3]}"]["arrived"]["value"] == first["arrived"].mean()
+    assert "a range of successive ones" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("hidden", [set(), {0}, {0, 1, 5}])
+def test_the_pose_of_a_learned_view_counts_views_without_contrast_out(monkeypatch, hidden):
+    """Also where all views before it are without contrast. No more are drawn than it takes."""
+    drawn = []
+
+    def training_views(encoding, renderer, poses):
+        drawn.append(len(poses))
+        learned = poses[[k not in hidden for k in range(len(poses))]]
+        if not len(learned):
+            raise SettingError("none")
+        return None, learned
+
+    monkeypatch.setattr("tussock.navigation.sweeps.worst.training_views", training_views)
+    poses = np.arange(30.0).reshape(10, 3)
+    kept = [k for k in range(10) if k not in hidden]
+    with ALONE.open_renderer(ALONE.open_world()) as renderer:
+        for number, k in enumerate(kept):
+            drawn.clear()
+            assert np.array_equal(learned_pose(number, ALONE, renderer, poses), poses[[k]])
+            assert max(drawn) == k + 1
 
 
 @pytest.mark.parametrize("width", WIDTHS)

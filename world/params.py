@@ -1,6 +1,6 @@
 """What a generated world is like: its parameters, the presets, and which texts name a generated world."""
 
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import attrs
@@ -9,6 +9,7 @@ from .errors import SettingError
 from .geometry import Bounds
 from .registry import LOCATION, Registry
 from .settings import RGB, colour, number, settings, whole
+from .specs import Spec
 
 
 @settings
@@ -179,9 +180,14 @@ def check_preset(text: str) -> None:
     spec = WORLDS.spec(text)
     if getattr(spec.target, "func", spec.target) is WorldParams:
         try:
-            spec.make()
+            _check_parameters(spec)
         except SettingError as error:
             raise SettingError(f"world {text!r}: {error}") from error
+
+
+@lru_cache  # the runs of a sweep are in few kinds of worlds
+def _check_parameters(spec: Spec) -> None:
+    spec.make()
 
 
 def preset_of(params: WorldParams) -> str | None:

@@ -85,7 +85,8 @@ def signature_of(target: Callable[..., Any]) -> inspect.Signature:
         raise SettingError(f"{target!r} has no parameters to set ({error}); name a class or function") from error
 
 
-def own_parameters(target: Callable[..., Any]) -> dict[str, Any]:
+@cache
+def own_parameters(target: Callable[..., Any]) -> Mapping[str, Any]:
     """The parameters of a class or function that a spec may set, with their defaults (None where it has none)."""
     return {
         name: None if each.default is each.empty else each.default

@@ -32,7 +32,11 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
     """
     figure, axes = canvas((7.2, 0.6 + 2.1 * len(measures)), len(measures), 1, sharex=True)
     panels = dict(zip(measures, axes[:, 0], strict=True))
-    lines = [(choice_label(key), part) for key, part in table.groupby(by, dropna=False, sort=True)] if by else []
+    lines = (
+        [(choice_label(key), part) for key, part in table.groupby(by, dropna=False, sort=True, observed=True)]
+        if by
+        else []
+    )
     lines = lines or [("", table)]
     labels = list(by_axis(table, axis, []))
     numeric = len(axis) == 1 and pd.api.types.is_numeric_dtype(table[axis[0]]) and not bool(table[axis[0]].isna().any())

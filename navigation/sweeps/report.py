@@ -16,12 +16,24 @@ from ..reports.report import REPORT, Block, Cell, Command, Drawing, Report, Sect
 from ..reports.report import RESULTS as REPLICATION_RESULTS
 from ..reports.results import plain_json
 from .figures import along_axis
-from .statistics import MEASURES, Interval, axes_of, by_axis, choice_label, means, pairings, setting_label
-from .store import Store, read_steps, table_of
+from .statistics import (
+    MAX_CHOICES,
+    MEASURES,
+    Interval,
+    axes_of,
+    by_axis,
+    choice_label,
+    means,
+    pairings,
+    ranges_of,
+    setting_label,
+)
+from .store import TABLE, Store, read_steps
 from .sweep import worst_of
 from .worst import walk_section
 
 RESULTS = "report.json"
+MAX_ERRORS = 100  # on the page
 LEAD = "Success and errors of all runs, and why the worst of them failed."
 INTERVALS = (
     "Numbers in parentheses are 95 % bootstrap confidence intervals of the mean. Runs in one world are not independent, so whole worlds "
@@ -31,6 +43,7 @@ PAIRS = (
     "Pairs, compared on the runs that are equal in everything else. A difference is the first minus the second; it is bold where its "
     "interval does not contain 0."
 )
+IN_RANGES = f"There are more than {MAX_CHOICES} choices. Each value is of a range of successive ones; the single runs are in {TABLE}."
 FAILED = "Walks that did not arrive or were put back, by the cause that the evidence of their poor steps supports."
 WALKS = (
     "From above: the route in blue to its goal, the walk in red, poor steps as dots, and a ring around the step that is shown. Views are "
@@ -56,19 +69,19 @@ def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_
     if (folder / REPLICATION_RESULTS).exists():
         raise FileError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
     with Store(folder, read_only=True) as store:
-        rows = store.rows()
-        if not rows:
+        table = store.table()
+        if table.empty:
             raise FileError(f"{folder} holds no finished run yet; try again later")
-        shown = worst_of(rows, worst)
+        shown = worst_of(table, worst)
         walks = [
-            walk_section(number, key, rows[key], read_steps(store.steps(key)), folder)
+            walk_section(number, key, store.row(key), read_steps(store.steps(key)), folder)
             for number, key in enumerate(shown, 1)
         ]
-    table = table_of(rows)
     completed = table[table["error"].isna()].reset_index(drop=True)
     if completed.empty:
         raise FileError(f"no run in {folder} could be completed; the first: {table['error'].iloc[0]}")
     axes = axes_of(completed, list(TYPES))
+    completed = completed.assign(**_ranges(completed, axes))
     measures = [name for name in MEASURES if name != "resets" or completed["resets"].to_numpy().any()]
     results = plain_json(_results(table, completed, axes, measures, shown))
     report = Report(
@@ -98,9 +111,9 @@ def _results(
         "by": {
             label: {
                 choice: {"runs": count, **_numbers(intervals)}
-                for choice, (count, intervals) in by_axis(completed, names, measures).items()
+                for choice, (count, intervals) in by_axis(completed, _columns(completed, axes, label), measures).items()
             }
-            for label, names in axes.items()
+            for label in axes
         },
         "pairs": [dataclasses.asdict(pair) for pair in (pairings(completed, list(TYPES), measures, by) if by else [])],
         "causes": {
@@ -109,6 +122,17 @@ def _results(
         "worst": worst,
         "could_not_run": [{"command": row.command, "error": row.error} for row in not_run.itertuples()],
     }
+
+
+def _ranges(completed: pd.DataFrame, axes: dict[str, list[str]]) -> dict[str, pd.Categorical]:
+    """Columns with the ranges of the axes that have too many choices to show each."""
+    ranges = {f"ranges of {label}": ranges_of(completed, names) for label, names in axes.items()}
+    return {name: values for name, values in ranges.items() if values is not None}
+
+
+def _columns(completed: pd.DataFrame, axes: dict[str, list[str]], label: str) -> list[str]:
+    """The columns by which runs are put together along an axis."""
+    return [name] if (name := f"ranges of {label}") in completed else axes[label]
 
 
 def _compared(axes: dict[str, list[str]]) -> list[str]:
@@ -158,10 +182,12 @@ def _blocks(
     )
     blocks.append(Section(title="Why walks failed", anchor="causes", blocks=[Text(FAILED), causes]))
     blocks.append(Section(title="The worst walks", anchor="worst", blocks=[Text(WALKS, style="soft"), *walks]))
-    if results["could_not_run"]:
-        errors = [
-            block for each in results["could_not_run"] for block in (Text(each["error"]), Command(each["command"]))
-        ]
+    if not_run := results["could_not_run"]:
+        errors: list[Block] = []
+        for each in not_run[:MAX_ERRORS]:
+            errors += [Text(each["error"]), Command(each["command"])]
+        if len(not_run) > MAX_ERRORS:
+            errors.append(Text(f"{len(not_run) - MAX_ERRORS} more are in {RESULTS}."))
         blocks.append(Section(title="Runs that could not be completed", anchor="not-run", blocks=errors))
     return blocks
 
@@ -173,8 +199,10 @@ def _axis(
     names, by = axes[label], _compared(axes)
     anchor = f"by-{'-'.join(names)}"
     lines = [] if names == by else by
+    columns = _columns(completed, axes, label)
+    note = Text(IN_RANGES, style="soft")
     drawing = Drawing(
-        names=(anchor,), draw=lambda: [along_axis(completed, names, measures, lines)], alt=f"Means by {label}"
+        names=(anchor,), draw=lambda: [along_axis(completed, columns, measures, lines)], alt=f"Means by {label}"
     )
     table = Table(
         columns=[label, "runs", *(MEASURES[measure] for measure in measures)],
@@ -183,7 +211,7 @@ def _axis(
             for choice, numbers in choices.items()
         ],
     )
-    return Section(title=f"By {label}", anchor=anchor, blocks=[drawing, table])
+    return Section(title=f"By {label}", anchor=anchor, blocks=[drawing, *[note] * (columns != names), table])
 
 
 def _pairs(pairs: list[dict[str, Any]], measures: list[str]) -> Section:

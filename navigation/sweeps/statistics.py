@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,9 @@ MEASURES = {  # columns of the table of runs, with their labels
 HIGHER_IS_BETTER = ("arrived",)
 UNITS = {"m": "m", "deg": "°"}
 AXIS_ORDER = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # other axes are 1
-MAX_DRAWS = 2**22  # random numbers in memory at once
+MAX_GROUPS = 2000  # of a bootstrap; with more, it differs from a normal distribution about as much as from itself with another seed
+MAX_CHOICES = 200  # of an axis in a report; more are put together
+RANGES = 20  # that choices are put together in
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,8 @@ class Pairing:
 def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]) -> Interval:
     """Mean of values and its percentile bootstrap interval. Whole groups are drawn, as runs in one world are not independent.
 
+    For more than MAX_GROUPS groups, it is the interval of a normal distribution.
+
     Args:
         values: The values.
         groups: Number of each value's group. For a single group, single values are drawn.
@@ -70,15 +76,22 @@ def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]
     if len(np.unique(groups)) == 1:
         groups = np.arange(len(values))
     _, number = np.unique(groups, return_inverse=True)
-    sums, counts = np.bincount(number, weights=values), np.bincount(number)
-    rng, batch = np.random.default_rng(0), min(SAMPLES, max(1, MAX_DRAWS // len(sums)))
-    means = np.empty(SAMPLES)
-    for begin in range(0, SAMPLES, batch):
-        part = means[begin : begin + batch]
-        drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=len(part))
-        part[:] = (drawn @ sums) / (drawn @ counts)
-    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Interval(float(values.mean()), float(low), float(high))
+    sums, counts, value = np.bincount(number, weights=values), np.bincount(number), float(values.mean())
+    if len(sums) > MAX_GROUPS:
+        error = np.linalg.norm(sums - value * counts) / len(values)
+        ends = value + error * NormalDist().inv_cdf((1 + CONFIDENCE) / 2) * np.array([-1, 1])
+        low, high = ends.clip(values.min(), values.max())  # as those of samples
+    else:
+        drawn = _draws(len(sums))
+        low, high = np.quantile((drawn @ sums) / (drawn @ counts), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Interval(value, float(low), float(high))
+
+
+@lru_cache(maxsize=2)  # of 64 MB at most; measures and choices have the same
+def _draws(groups: int) -> Float[np.ndarray, "samples groups"]:
+    """How often each group is in each sample of a bootstrap."""
+    rng = np.random.default_rng(0)
+    return rng.multinomial(groups, np.full(groups, 1 / groups), size=SAMPLES).astype(float)
 
 
 def worlds_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
@@ -132,7 +145,10 @@ def choice_label(key: object) -> str:
 
 def means(table: pd.DataFrame, measures: Sequence[str]) -> dict[str, Interval]:
     """Mean and interval of each measure over runs."""
-    groups = worlds_of(table)
+    return _means(table, measures, worlds_of(table))
+
+
+def _means(table: pd.DataFrame, measures: Sequence[str], groups: Int[np.ndarray, " n"]) -> dict[str, Interval]:
     return {measure: mean_interval(table[measure].to_numpy(dtype=float), groups) for measure in measures}
 
 
@@ -140,13 +156,29 @@ def by_axis(
     table: pd.DataFrame, names: list[str], measures: Sequence[str]
 ) -> dict[str, tuple[int, dict[str, Interval]]]:
     """Number of runs, and `means`, for each choice of an axis, in order."""
-    parts = table.groupby(names, dropna=False, sort=True)
-    return {choice_label(key): (len(part), means(part, measures)) for key, part in parts}
+    groups, results = worlds_of(table), {}
+    for key, part in table.reset_index(drop=True).groupby(names, dropna=False, sort=True, observed=True):
+        of_choice, _ = pd.factorize(groups[part.index])  # in the order in which they appear there
+        results[choice_label(key)] = len(part), _means(part, measures, of_choice)
+    return results
+
+
+def ranges_of(table: pd.DataFrame, names: list[str]) -> pd.Categorical | None:
+    """For each run, in which range of successive choices of an axis it is, where the axis has more than MAX_CHOICES."""
+    number = table.groupby(names, dropna=False, sort=True, observed=True).ngroup().to_numpy()
+    _, first = np.unique(number, return_index=True)
+    if len(first) <= MAX_CHOICES:
+        return None
+    parts = np.array_split(np.arange(len(first)), RANGES)
+    ends = [table[names].iloc[first[part[[0, -1]]]].itertuples(index=False, name=None) for part in parts]
+    labels = [" to ".join(map(choice_label, each)) for each in ends]
+    return pd.Categorical.from_codes(np.repeat(np.arange(RANGES), list(map(len, parts)))[number], labels, ordered=True)
 
 
 def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[str], axis: list[str]) -> list[Pairing]:
     """Every two choices of an axis, compared on the runs for which all other settings are equal."""
-    rest = [name for name in table.columns.intersection(settings, sort=False) if name not in axis]
+    others = [name for name in table.columns.intersection(settings, sort=False) if name not in axis]
+    rest = [name for name in others if len(table[name].unique()) > 1] or others
     parts = {choice_label(key): part for key, part in table.groupby(axis, dropna=False, sort=True)}
     results = []
     for first, second in combinations(parts, 2):

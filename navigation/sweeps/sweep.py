@@ -13,6 +13,7 @@ from typing import Any
 
 import dask.config
 import numpy as np
+import pandas as pd
 from dask.base import tokenize
 from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.comm.core import CommClosedError
@@ -22,12 +23,12 @@ from tussock.world.errors import FileError, InputError, MissingDependencyError, 
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
-from ..experiment_keys import key_of, route_key, training_key, views_key
+from ..experiment_keys import Keys, route_key, training_key, views_key
 from ..experiment_settings import TYPES, run_command, settings_of
 from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
-from .store import Finished, Store, table_of, write_table
+from .store import TABLE, Finished, Store, write_table
 from .work import Walked, draw, learn, walk
 from .workers import METHOD, WORK, prepare_workers
 
@@ -67,7 +68,7 @@ def run_sweep(
         InputError: Where another sweep writes to the folder, and where runs could not be finished; all others are kept.
     """
     began = time.perf_counter()
-    runs = {key_of(run): run for run in sweep.experiments}
+    runs = _by_key(sweep)
     with Store(out) as store:
         store.check_settings(TYPES)
         finished = store.finished()
@@ -81,30 +82,35 @@ def run_sweep(
             with suppress(InputError):  # what ended the sweep matters more, a full disk above all
                 _write_table(store, out)
             raise
-        path = _write_table(store, out)
-        rows = [row for key, row in store.rows().items() if key in runs]
+        table = _write_table(store, out)
+    table = table[table["key"].isin(runs)]
     return {
-        "table": str(path),
+        "table": str(out / TABLE),
         "runs": len(runs),
         "done_before": len(runs) - len(missing),
-        "arrived": sum(row.get("arrived", False) for row in rows),
-        "could_not_run": sum(row["error"] is not None for row in rows),
+        "arrived": int(table["arrived"].sum()) if "arrived" in table else 0,
+        "could_not_run": int(table["error"].notna().sum()),
         "seconds": time.perf_counter() - began,
     }
 
 
 def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
     """Keep recordings of the worst runs of a finished sweep; returns their folders. Raises InputError as `record_again` does."""
-    runs = {key_of(run): run for run in sweep.experiments}
+    runs = _by_key(sweep)
     with Store(out) as store:
-        rows = {key: row for key, row in store.rows().items() if key in runs}
-        worst = worst_of(rows, count)
+        table = store.table()
+        worst = worst_of(table[table["key"].isin(runs)], count)
         try:
             for key in worst:
-                record_again(runs[key], rows[key], out / WORST / key)
+                record_again(runs[key], store.row(key), out / WORST / key)
         finally:
             _write_table(store, out)
     return [out / WORST / key for key in worst]
+
+
+def _by_key(sweep: Sweep) -> dict[str, Experiment]:
+    keys = Keys()
+    return {keys.run(run): run for run in sweep.experiments}
 
 
 def _run(
@@ -180,8 +186,9 @@ def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
     """Which runs walk together, as keys: runs of one trained model, so many that all workers are busy. One world after the other."""
     groups: dict[tuple[str, ...], list[str]] = {}
     first: dict[str, int] = {}  # when a world, views and a model are first needed
+    keys = Keys()
     for key, run in runs.items():
-        names = route_key(run), views_key(run), training_key(run)
+        names = keys.shared(run)
         groups.setdefault(names, []).append(key)
         for name in names:
             first.setdefault(name, len(first))
@@ -232,14 +239,13 @@ def finished_run(experiment: Experiment, key: str, result: Walked | InputError) 
     return Finished(key=key, settings=settings, row=row, steps=result.steps)
 
 
-def worst_of(rows: dict[str, dict[str, Any]], count: int) -> list[str]:
+def worst_of(table: pd.DataFrame, count: int) -> list[str]:
     """Keys of the worst runs: those that did not arrive, then those put back most often, then those with the greatest deviation."""
-    walked = [key for key, row in rows.items() if row["error"] is None]
-    return sorted(walked, key=lambda key: _badness(rows[key]), reverse=True)[:count]
-
-
-def _badness(row: dict[str, Any]) -> tuple:
-    return not row["arrived"], row["resets"], row["mean_deviation_m"]
+    walked = table[table["error"].isna()]
+    if walked.empty:
+        return []
+    badness = ["arrived", "resets", "mean_deviation_m"]
+    return walked.sort_values(badness, ascending=[True, False, False], kind="stable")["key"].head(count).tolist()
 
 
 def record_again(experiment: Experiment, row: dict[str, Any], out: Path) -> None:
@@ -258,10 +264,13 @@ def record_again(experiment: Experiment, row: dict[str, Any], out: Path) -> None
         )
 
 
-def _write_table(store: Store, out: Path) -> Path:
+def _write_table(store: Store, out: Path) -> pd.DataFrame:
     """Write the table of all finished runs. A column gives the path of the recording, if there is one."""
-    rows = store.rows()
-    for key, row in rows.items():
-        recorded = (out / WORST / key / "summary.json").exists()
-        row["recording"] = f"{WORST}/{key}/recording.rrd" if recorded else None
-    return write_table(table_of(rows), out)
+    table = store.table()
+    recorded = {
+        path.parent.name: f"{WORST}/{path.parent.name}/recording.rrd" for path in out.glob(f"{WORST}/*/summary.json")
+    }
+    if len(table):
+        table["recording"] = table["key"].map(recorded).astype("string")
+    write_table(table, out)
+    return table

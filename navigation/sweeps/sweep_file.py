@@ -1,12 +1,11 @@
 """Sweep files: TOML that names settings of `tussock run`, fixed ones and axes. Bad ones are refused before the first run."""
 
-import itertools
 import json
 import math
 import re
 import tomllib
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import NoneType
@@ -16,10 +15,11 @@ from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.params import is_generated
 
 from ..experiment import MODEL_SUFFIX, Experiment
+from ..experiment_keys import WALK_SETTINGS
 from ..experiment_settings import TYPES, experiment_of
 from ..models.files import TrainedModel
 from ..setting_names import message_of
-from .spec import Sweep
+from .spec import Sweep, combinations
 
 MAX_RUNS = 1_000_000
 ALWAYS = {"threads": 1}  # where a sweep file does not say otherwise: runs share the cores
@@ -70,7 +70,7 @@ class _Reader:
         if (count := math.prod(map(len, axes.values()))) > MAX_RUNS:
             raise FileError(f"{self.path} asks for {count:,} runs; ask for {MAX_RUNS:,} at most")
         title = self.document.get("title", self.path.stem)
-        return Sweep(title, axes, list(self.experiments(fixed, axes, count)))
+        return Sweep(title, axes, list(self.experiments(fixed, axes)))
 
     def check_names(self, fixed: Choice, axes: dict[str, list[Choice]]) -> None:
         """Refuse what is set twice, and axes whose choices set different things."""
@@ -87,20 +87,24 @@ class _Reader:
                     "axes", name, f"{name} has the same choice twice; a run repeats to the byte: vary its seed"
                 )
 
-    def experiments(self, fixed: Choice, axes: dict[str, list[Choice]], count: int) -> Iterator[Experiment]:
+    def experiments(self, fixed: Choice, axes: dict[str, list[Choice]]) -> Iterator[Experiment]:
         """The experiment of every combination."""
-        for number, choices in enumerate(itertools.product(*axes.values()), 1):
-            places: list[Place] = [("fixed", key, {key: value}) for key, value in fixed.items()]
-            places += [("axes", name, choice) for name, choice in zip(axes, choices, strict=True)]
+        set_always: list[Place] = [("fixed", key, {key: value}) for key, value in fixed.items()]
+
+        def make(choices: Sequence[Choice]) -> Experiment:
+            places = set_always + [("axes", name, choice) for name, choice in zip(axes, choices, strict=True)]
             try:
-                yield self.experiment(places)
+                return self.experiment(places)
             except InputError as error:
                 text = message_of(error, {key for _, _, choice in places for key in choice})
                 place = self.responsible(places, str(error))
                 if place is None:
-                    raise SettingError(f"{self.path}, run {number} of {count}: {text}") from error
+                    given = ", ".join(f"{key} {value}" for each in choices for key, value in each.items())
+                    raise SettingError(f"{self.path}, {given}: {text}") from error
                 table, name, choice = place
                 raise self.error(table, name, text, *choice.values()) from error
+
+        return combinations(list(axes.values()), make, lambda name: name in WALK_SETTINGS)
 
     def experiment(self, places: list[Place]) -> Experiment:
         """The experiment of settings that stand in several places."""

@@ -1,15 +1,20 @@
 """The worst walks in a sweep's report: each from above, with its view where it went wrong."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
 from matplotlib.figure import Figure
 
+from tussock.render.renderer import Renderer
+from tussock.world.errors import SettingError
 from tussock.world.specs import Spec
 
+from ..experiment import Experiment
 from ..experiment_settings import TYPES, experiment_of
 from ..failures import Diagnosis
 from ..reports.report import Command, Drawing, Section
@@ -54,10 +59,20 @@ def _draw(row: dict[str, Any], steps: pd.DataFrame, shown: int) -> Iterator[Figu
     with experiment.open_renderer(world) as renderer:
         view, match = renderer.eye.hide(renderer.render(pose))[0], None
         if isinstance(experiment.model, Spec) and not pd.isna(step["match"]):
-            _, learned = training_views(experiment.encoding, renderer, experiment.training_poses(world, route))
-            match = renderer.eye.hide(training_source(renderer).render(learned[[int(step["match"])]]))[0]
+            learned = learned_pose(int(step["match"]), experiment, renderer, experiment.training_poses(world, route))
+            match = renderer.eye.hide(training_source(renderer).render(learned))[0]
     yield walk_map(world, route, steps, shown)
     yield view_and_match(view, match)
+
+
+def learned_pose(number: int, experiment: Experiment, renderer: Renderer, poses: Float[np.ndarray, "n 3"]):
+    """(1, 3) Pose of the view that was learned with a number; views without contrast were not learned."""
+    count, learned = 0, poses[:0]
+    while len(learned) <= number and count < len(poses):
+        count += number + 1 - len(learned)  # no more views are drawn than it takes
+        with suppress(SettingError):  # none of these was learned
+            _, learned = training_views(experiment.encoding, renderer, poses[:count])
+    return learned[[number]]
 
 
 def step_to_show(row: dict[str, Any], steps: pd.DataFrame) -> int:
