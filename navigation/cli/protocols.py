@@ -42,13 +42,13 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     """Replace the report of something else in the folder."""
 
     def run(self) -> dict[str, Any]:
+        workers = self.started_workers()
         from ..reports.report import check_report_folder
         from ..studies.protocols.replication import replicate
 
         protocol = self.protocol()
         out = self.out or Path(protocol.name)
         self.check()
-        workers = self.started_workers()
         sweep = self.sweep(protocol)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)

@@ -27,12 +27,12 @@ class SweepCommand(WorkerOptions):
     """Classes of your own that files of models need, as package.module:Class; several with commas between them."""
 
     def run(self) -> dict[str, Any]:
-        from ..sweeps.sweep_file import read_sweep
-
         record = re.fullmatch(r"worst:(\d{1,6})", self.record or "worst:0")
         if record is None:
             raise SettingError(f"--record {self.record!r}: give worst:5, or another number")
         workers = self.started_workers()
+        from ..sweeps.sweep_file import read_sweep
+
         import_used(self.use)
         sweep = read_sweep(self.sweep)
 

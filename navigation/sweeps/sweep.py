@@ -35,7 +35,7 @@ from .workers import METHOD, WORK, prepare_workers
 log = logging.getLogger(__name__)
 
 MAX_TOGETHER = 16  # runs: more gain little, and are kept later
-PARTS = 2  # groups of runs for each worker, where there are few runs
+PARTS = 3  # groups of runs for each worker, where there are few runs
 QUEUED = 4  # groups that each worker has before it; more would only fill the scheduler's memory
 WORST = "worst"  # folder of the recordings
 SECONDS = 10.0  # to wait for a scheduler
