@@ -1,4 +1,4 @@
-"""Means of blocks of pixels, fast, and equal to numpy's to the last bit."""
+"""Means of blocks of pixels, fast; equal to numpy's to the last bit where two or more blocks are side by side."""
 
 from functools import reduce
 

@@ -87,18 +87,19 @@ def tree_of(world: World) -> TriangleTree:
 def _order(points: Float32[np.ndarray, "n 3"], leaf: int) -> Int64[np.ndarray, " n"]:
     """The points in an order in which each `leaf` of them are close together, as are each 2 `leaf`, 4 `leaf` and so on.
 
-    All are cut in two along the longest side of the box around them, then each part likewise; first parts are full.
+    All are cut in two along the longest side of the box around them, then each part likewise. The first part of each cut is full: it has
+    `leaf` points, or 2 `leaf`, 4 `leaf` and so on.
     """
-    n, order, places = len(points), np.arange(len(points)), points.T.copy()
+    n, order, coordinates = len(points), np.arange(len(points)), points.T.copy()
     size = leaf << max(0, -(-n // leaf) - 1).bit_length()
     while size > leaf:
         size //= 2
         whole = n - n % (2 * size)
         for begin, end, length in ((0, whole, 2 * size), (whole, n, n - whole)):
             if begin < end and length > size:
-                parts = places[:, begin:end].reshape(3, -1, length)
+                parts = coordinates[:, begin:end].reshape(3, -1, length)
                 longest = np.ptp(parts, axis=2).argmax(axis=0)
                 cut = np.argpartition(parts[longest, np.arange(len(longest))], size, axis=1)
-                places[:, begin:end] = np.take_along_axis(parts, cut[None], axis=2).reshape(3, -1)
+                coordinates[:, begin:end] = np.take_along_axis(parts, cut[None], axis=2).reshape(3, -1)
                 order[begin:end] = np.take_along_axis(order[begin:end].reshape(-1, length), cut, axis=1).ravel()
     return order

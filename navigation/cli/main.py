@@ -60,8 +60,9 @@ COMMANDS: dict[str, Any] = {
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 1 when a check finds something, 130 when interrupted."""
-    arguments = sys.argv[1:] if arguments is None else arguments
-    collect_rarely()
+    if arguments is None:
+        collect_rarely()
+        arguments = sys.argv[1:]
     if arguments == ["--version"]:
         print(f"tussock {version('tussock')}")
         return
@@ -167,7 +168,7 @@ def choice_of(commands: dict[str, Any]) -> Any:
 
 def collect_rarely() -> None:
     """Look for garbage in cycles rarely, and not at the end. Imports make a million objects, none of them garbage: to look through these
-    again and again takes a second of `tussock run`, half of it at the end.
+    again and again takes a second of `tussock run`, half of it at the end. It changes the whole process.
     """
     gc.set_threshold(100_000)
     atexit.register(gc.freeze)

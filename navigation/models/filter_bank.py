@@ -116,5 +116,5 @@ class NearestFilters:
         least = views.new_full((n, width), torch.inf)
         index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
         for chunk in self._spectra.chunks(views, self._biases, among):
-            chunk.lower(least[chunk.views], index[chunk.views])
+            chunk.update_least(least[chunk.views], index[chunk.views])
         return least, index

@@ -4,7 +4,7 @@ import numpy as np
 
 from tussock.render.compile import compiled
 
-GROUP = 32  # cells whose largest drive is found first
+CELLS = 32  # in a group, whose largest drive is found first
 COLUMNS = 64  # projections at once: what is computed of them then stays in the processor's cache
 
 
@@ -21,7 +21,7 @@ def largest_drives(projections, wiring, cells):
         cells: (n, count) Stored here.
     """
     n, count = cells.shape
-    groups = -(-len(wiring) // GROUP)
+    groups = -(-len(wiring) // CELLS)
     drives = np.empty((len(wiring), COLUMNS), projections.dtype)
     maxima = np.empty((groups, COLUMNS), projections.dtype)
     values = np.empty(count, projections.dtype)
@@ -37,9 +37,9 @@ def largest_drives(projections, wiring, cells):
             found = 0
             for group in range(groups):
                 if maxima[group, j] >= limit:
-                    first = group * GROUP
+                    first = group * CELLS
                     found = _insert_all(
-                        drives, j, first, min(first + GROUP, len(wiring)), limit, values, cells[start + j], found
+                        drives, j, first, min(first + CELLS, len(wiring)), limit, values, cells[start + j], found
                     )
 
 
@@ -49,7 +49,7 @@ def _drive(projections, wiring, drives, maxima):
     n, inputs = projections.shape[1], wiring.shape[1]
     several = inputs - inputs % 5
     for cell in range(len(wiring)):
-        drive, largest, wired = drives[cell, :n], maxima[cell // GROUP, :n], wiring[cell]
+        drive, largest, wired = drives[cell, :n], maxima[cell // CELLS, :n], wiring[cell]
         for j in range(n):
             drive[j] = 0
         for i in range(0, several, 5):  # five at once, as it takes longest to store a sum and to load it again
@@ -61,7 +61,7 @@ def _drive(projections, wiring, drives, maxima):
             a = projections[wired[i]]
             for j in range(n):
                 drive[j] += a[j]
-        if cell % GROUP == 0:
+        if cell % CELLS == 0:
             for j in range(n):
                 largest[j] = drive[j]
         for j in range(n):

@@ -7,7 +7,7 @@ from typing import TypeVar
 import torch
 from jaxtyping import Complex, Float
 
-from .products import PANEL, TILE
+from .products import FILTERS, PANEL, TILE
 
 Self = TypeVar("Self", bound="Growing")
 
@@ -92,7 +92,7 @@ class Tiles(Growing):
         return len(self.storage) * TILE
 
     def _enlarged(self, size: int) -> torch.Tensor:
-        tiles = self.storage.new_zeros(-(-size // TILE), *self.storage.shape[1:])
+        tiles = self.storage.new_zeros(-(-min(size, FILTERS) // TILE), *self.storage.shape[1:])
         taken = -(-self._length // TILE)
         tiles[:taken] = self.storage[:taken]
         return tiles

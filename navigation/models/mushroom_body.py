@@ -14,7 +14,7 @@ from tussock.world.settings import number, whole
 from ..threads import in_threads
 from .base import Images, Learned, Scans, Shapes, model
 from .filter_bank import FilterBank
-from .firing import largest_drives
+from .firing import CELLS, largest_drives
 from .incremental import IncrementalModel
 from .rotations import smoothed
 
@@ -167,9 +167,11 @@ class MushroomBody(IncrementalModel):
 
     def _firing(self, projections: Float32[torch.Tensor, "neurons n"], wiring: torch.Tensor) -> torch.Tensor:
         """Indices (n, firing) of the Kenyon cells that fire at each of n projections."""
-        if projections.device.type != "cpu":
-            return largest(embedding_bag(wiring, projections.contiguous(), mode="sum"), self.firing)
-        cells = torch.empty(projections.shape[1], self.firing, dtype=torch.int64)
+        n = projections.shape[1]
+        if projections.device.type != "cpu" or self.firing * CELLS > len(wiring):  # where many fire, sorting is faster
+            several = projections if n > 1 else projections.expand(-1, 2)  # for one, torch takes 20 times as long
+            return largest(embedding_bag(wiring, several.contiguous(), mode="sum")[:, :n], self.firing)
+        cells = torch.empty(n, self.firing, dtype=torch.int64)
         of_neurons, of_cells, chosen = projections.numpy(), wiring.numpy(), cells.numpy()
         in_threads(
             lambda begin, end: largest_drives(

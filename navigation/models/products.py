@@ -15,12 +15,13 @@ from numba.extending import intrinsic
 
 from tussock.render.compile import compiled
 
+FILTERS = 4096  # that are stored together: this limits what is copied when others are added
 TILE = 64  # filters that are multiplied at once: what is computed on the way stays in the processor's cache
 PANEL = 16  # of these that are stored together: they are read from memory in one go
 # Bytes of a register of the processor. Those of AVX-512 are larger, but gain little (on an AMD EPYC 9004, 97 to 88 Gflop/s), and where
 # there are none, such code is slower (48 to 80).
 REGISTER = 32
-MAX = 2**31 - 1  # of a whole number of 32 bits
+MAX = 2**31 - 1  # the greatest whole number of 32 bits
 
 
 def _sums(rows: int) -> Any:
@@ -32,8 +33,9 @@ def _sums(rows: int) -> Any:
 
     @intrinsic
     def sums_of_products(typing, left, row, right, column, sums, start):
-        if not left.layout == right.layout == sums.layout == "C":
-            return None
+        arrays = left, right, sums
+        if not all(each.layout == "C" and each.ndim == 2 and each.dtype == left.dtype for each in arrays):
+            return None  # numba then says that no function takes these
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             number, index = context.get_data_type(left.dtype), ir.IntType(64)

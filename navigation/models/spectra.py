@@ -10,11 +10,9 @@ from jaxtyping import Float, Float64, Int64
 
 from ..threads import in_threads
 from .growing import Tiles
-from .products import TILE, absolute, nearest, respond
+from .products import FILTERS, TILE, absolute, nearest, respond
 
-# Filters that are stored together: this limits what is copied when others are added. Views that are multiplied at once: what is computed
-# on the way then stays in the processor's cache (measured on an AMD EPYC with 1 MB of it per core).
-FILTERS, VIEWS = 4096, 16
+VIEWS = 16  # that are multiplied at once: what is computed on the way stays in the processor's cache (1 MB of an AMD EPYC's core)
 SMALL = 2**23  # multiplications; below it, one thread is the quickest
 
 
@@ -52,7 +50,7 @@ class Spectra:
         biases: Float[torch.Tensor, " m"] | None = None,
         among: slice = slice(None),
     ) -> Iterator["Chunk"]:
-        """Some views and filters after the other, to compute what is wanted of their responses.
+        """Blocks of views and filters, one by one, to compute what is wanted of their responses.
 
         Args:
             views: (n, h, w)
@@ -107,7 +105,7 @@ class Chunk:
         self._in_threads(lambda *arguments: respond(*arguments, responses.numpy()))
         return responses
 
-    def lower(self, least: Float[torch.Tensor, "n w"], index: Int64[torch.Tensor, "n w"]) -> None:
+    def update_least(self, least: Float[torch.Tensor, "n w"], index: Int64[torch.Tensor, "n w"]) -> None:
         """Where a response to a rotation of the views is below `least`, change it to the least one, and `index` to its filter."""
         if not self._compiled:
             values, which = self.by_torch().min(dim=2)
@@ -137,8 +135,7 @@ class Chunk:
 
     def by_torch(self) -> Float[torch.Tensor, "n w m"]:
         """`responses` on any device. Sums may be rounded differently in another batch."""
-        products = torch.matmul(self.rows[:, None], self.tiles)  # (t, f, panels, 2 n, PANEL)
-        products = products.permute(1, 3, 0, 2, 4).flatten(2)
+        products = torch.bmm(self.rows, self.tiles.permute(1, 3, 0, 2, 4).flatten(2))  # (f, 2 n, columns)
         products = products[..., self.first : self.first + len(self.biases)].unflatten(1, (-1, 2))
         spectra = torch.complex(*products.unbind(dim=2))  # (f, n, m)
         return torch.fft.irfft(spectra, n=self.width, dim=0).movedim(0, 1) + self.biases

@@ -37,7 +37,8 @@ MAX_ERRORS = 100  # on the page
 LEAD = "Success and errors of all runs, and why the worst of them failed."
 INTERVALS = (
     "Numbers in parentheses are 95 % bootstrap confidence intervals of the mean. Runs in one world are not independent, so whole worlds "
-    "are drawn, with all of their runs; in a world from a file, whole routes. Where there is only one of these, single runs are drawn."
+    "are drawn, with all of their runs; in a world from a file, whole routes. Where there is only one of these, single runs are drawn. "
+    "For more than 2,000 of them, the intervals are those of a normal distribution."
 )
 PAIRS = (
     "Pairs, compared on the runs that are equal in everything else. A difference is the first minus the second; it is bold where its "
@@ -100,7 +101,7 @@ def _results(
     table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[str]], measures: list[str], worst: list[str]
 ) -> dict[str, Any]:
     """Everything in numbers; docs/sweeps.md explains it."""
-    by = _compared(axes)
+    by = _compared(completed, axes)
     failed = completed[~completed["arrived"].astype(bool) | (completed["resets"] > 0)]
     groups = failed.groupby(by, dropna=False) if by else [("all", failed)]
     not_run = table[table["error"].notna()]
@@ -135,9 +136,13 @@ def _columns(completed: pd.DataFrame, axes: dict[str, list[str]], label: str) ->
     return [name] if (name := f"ranges of {label}") in completed else axes[label]
 
 
-def _compared(axes: dict[str, list[str]]) -> list[str]:
-    """The settings of the axis whose choices are compared in pairs: that of models, or else that of encodings, or none."""
-    return next((names for wanted in ("model", "encoding") for names in axes.values() if wanted in names), [])
+def _compared(completed: pd.DataFrame, axes: dict[str, list[str]]) -> list[str]:
+    """The settings of the axis whose choices are compared in pairs: that of models, or else that of encodings, or none.
+
+    An axis with too many choices to show each is not compared.
+    """
+    few = [names for label, names in axes.items() if _columns(completed, axes, label) == names]
+    return next((names for wanted in ("model", "encoding") for names in few if wanted in names), [])
 
 
 def _numbers(intervals: dict[str, Interval]) -> dict[str, Any]:
@@ -196,7 +201,7 @@ def _axis(
     completed: pd.DataFrame, label: str, axes: dict[str, list[str]], measures: list[str], choices: dict[str, Any]
 ) -> Section:
     """The measures along an axis, as a figure and as a table."""
-    names, by = axes[label], _compared(axes)
+    names, by = axes[label], _compared(completed, axes)
     anchor = f"by-{'-'.join(names)}"
     lines = [] if names == by else by
     columns = _columns(completed, axes, label)

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tussock.world.errors import SettingError
+
 from ..experiment import Experiment
 from ..experiment_keys import WALK_FIELDS
 
@@ -45,6 +47,10 @@ class Sweep:
             [choice if isinstance(choice, Mapping) else {name: choice} for choice in of_axis]
             for name, of_axis in axes.items()
         ]
+        if not all(choices):
+            raise SettingError(
+                f"the axis {next(name for name in axes if not axes[name])} has no choice; give at least one"
+            )
 
         def make(changes: Sequence[Change]) -> Experiment:
             return base.replace(**{name: value for change in changes for name, value in change.items()})

@@ -19,17 +19,19 @@ from tussock.world.atomic import replacing
 from tussock.world.errors import DiskFullError, FileError
 
 FINISHED, TABLE, LOCK = "finished.sqlite", "runs.parquet", ".lock"
-_TABLES = """
+# Without it, all steps are read to find out which runs are finished. Older folders do not have it yet.
+_INDEX = "CREATE INDEX IF NOT EXISTS unfinished ON runs (key) WHERE again;"
+_TABLES = f"""
     BEGIN;
     CREATE TABLE runs (
         key TEXT PRIMARY KEY, settings TEXT NOT NULL UNIQUE, row TEXT NOT NULL, steps BLOB NOT NULL, again INTEGER NOT NULL
     );
-    CREATE INDEX unfinished ON runs (key) WHERE again; -- otherwise all steps are read to find out which runs are finished
+    {_INDEX}
     COMMIT;
 """
 _COLUMNS = ("key", "settings", "row", "steps", "again")
 TIMES = ("seconds", "learn_seconds")  # columns of the table that no two sweeps have alike
-PATIENCE = 600  # s that a sweep waits for one who reads its folder
+PATIENCE = 60  # s that a sweep waits for a reader of its folder
 PART = 1000  # rows that are in memory as objects, which take ten times as much as columns
 KINDS = {
     pa.null(): pd.StringDtype(),
@@ -79,8 +81,9 @@ class Store:
             # A reader, too, has to clean up after a writer that was killed, where it may write.
             mode = "rwc" if not read_only else "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
             self._database = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=PATIENCE)
-            if not (read_only or self._database.execute("SELECT 1 FROM sqlite_master").fetchone()):
-                self._database.executescript(_TABLES)
+            if not read_only:
+                empty = self._database.execute("SELECT 1 FROM sqlite_master").fetchone() is None
+                self._database.executescript(_TABLES if empty else _INDEX)
             self._database.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs LIMIT 1").fetchone()
         except sqlite3.DatabaseError as error:
             self.close()
@@ -121,15 +124,18 @@ class Store:
         return _table(self._rows())
 
     def _rows(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        for key, row in self._read("SELECT key, row FROM runs"):
-            yield key, json.loads(row)
+        key, part = "", [("", "")]
+        while part:  # in parts, between which a sweep can write
+            part = list(self._read("SELECT key, row FROM runs WHERE key > ? ORDER BY key LIMIT ?", key, PART))
+            for key, row in part:
+                yield key, json.loads(row)
 
     def steps(self, key: str) -> str:
         """The steps of a finished run, as CSV."""
         ((packed,),) = self._read("SELECT steps FROM runs WHERE key = ?", key)
         return zlib.decompress(packed).decode()
 
-    def _read(self, query: str, *values: str) -> Iterator[tuple]:
+    def _read(self, query: str, *values: str | int) -> Iterator[tuple]:
         """What the database answers. Raises FileError where it is damaged."""
         try:
             yield from self._database.execute(query, values)
