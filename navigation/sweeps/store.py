@@ -19,14 +19,12 @@ from tussock.world.atomic import replacing
 from tussock.world.errors import DiskFullError, FileError
 
 FINISHED, TABLE, LOCK = "finished.sqlite", "runs.parquet", ".lock"
-# Without it, all steps are read to find out which runs are finished. Older folders do not have it yet.
-_INDEX = "CREATE INDEX IF NOT EXISTS unfinished ON runs (key) WHERE again;"
-_TABLES = f"""
+_TABLES = """
     BEGIN;
     CREATE TABLE runs (
         key TEXT PRIMARY KEY, settings TEXT NOT NULL UNIQUE, row TEXT NOT NULL, steps BLOB NOT NULL, again INTEGER NOT NULL
     );
-    {_INDEX}
+    CREATE INDEX unfinished ON runs (key) WHERE again; -- otherwise all steps are read to find out which runs are finished
     COMMIT;
 """
 _COLUMNS = ("key", "settings", "row", "steps", "again")
@@ -81,9 +79,8 @@ class Store:
             # A reader, too, has to clean up after a writer that was killed, where it may write.
             mode = "rwc" if not read_only else "rw" if os.access(path, os.W_OK) and os.access(folder, os.W_OK) else "ro"
             self._database = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=PATIENCE)
-            if not read_only:
-                empty = self._database.execute("SELECT 1 FROM sqlite_master").fetchone() is None
-                self._database.executescript(_TABLES if empty else _INDEX)
+            if not (read_only or self._database.execute("SELECT 1 FROM sqlite_master").fetchone()):
+                self._database.executescript(_TABLES)
             self._database.execute(f"SELECT {', '.join(_COLUMNS)} FROM runs LIMIT 1").fetchone()
         except sqlite3.DatabaseError as error:
             self.close()

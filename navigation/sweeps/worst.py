@@ -22,8 +22,6 @@ from ..training import training_source, training_views
 from .figures import view_and_match, walk_map
 from .sweep import WORST
 
-AT_ONCE = 16  # training views that are drawn
-
 
 def walk_section(number: int, key: str, row: dict[str, Any], steps: pd.DataFrame, folder: Path) -> Section:
     """What the report shows of a walk.
@@ -73,7 +71,7 @@ def learned_pose(
     """(1, 3) Pose of the view that was learned with a number; views without contrast were not learned."""
     count, learned = 0, poses[:0]
     while len(learned) <= number and count < len(poses):
-        some = poses[count : count + max(AT_ONCE, number + 1 - len(learned))]  # few more views are drawn than it takes
+        some = poses[count : count + number + 1 - len(learned)]  # no more views are drawn than it takes
         count += len(some)
         with suppress(SettingError):  # none of these was learned
             learned = np.concatenate([learned, training_views(experiment.encoding, renderer, some)[1]])
