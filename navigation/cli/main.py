@@ -172,6 +172,7 @@ def collect_rarely() -> None:
     """
     gc.set_threshold(100_000)
     atexit.register(gc.freeze)
+    sys.setswitchinterval(0.0002)  # s; with 0.005, a thread that imports stops one that encodes views for that long at each array
 
 
 @contextmanager

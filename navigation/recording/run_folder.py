@@ -1,12 +1,11 @@
-"""A run's folder: the recording of a walk, its trajectory, summary and picture.
-
-rerun and matplotlib are imported where they are used: a run that is refused needs neither.
-"""
+"""A run's folder: the recording of a walk, its trajectory, summary and picture."""
 
 import json
 import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from .viewer import check_viewer
 
 TRAJECTORY, SUMMARY, PICTURE, ROUTE = "trajectory.csv", "summary.json", "overview.png", "route.csv"
 FILES = (RECORDING, TRAJECTORY, SUMMARY, PICTURE, ROUTE, UNFINISHED)
+IMPORTED_LATER = (f"{__package__}.log", "tussock.navigation.reports.maps", "pandas")  # pandas by pyarrow
 TRAINING_SETTINGS = ("every", "learning_walk_m")  # settings that do not apply to a model from a file
 
 
@@ -59,20 +59,22 @@ def record_run(
     given = (experiment.world, experiment.route, experiment.route_database, experiment.grid_database)
     files = [Path(each) for each in given if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
-    with experiment.opened(learning) as trained:
+    with experiment.opened_renderer() as (renderer, route):
+        with ThreadPoolExecutor(1) as thread:  # what is needed only later is imported while the views are drawn
+            thread.map(import_module, IMPORTED_LATER)
+            trained = experiment.train(renderer, route, learning)
+        from ..reports.maps import write_overview
+
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
         settings = _settings(experiment, trained)
         trajectory, seconds = _record(experiment, trained, out, viewer, settings, walking)
         summary = trajectory.summary()
         summary |= {"seconds": seconds, "steps_per_second": summary["steps"] / seconds, "recording": RECORDING}
-        write_route(trained.route, out / ROUTE)
+        write_route(route, out / ROUTE)
         deviation = f"{summary['mean_deviation_m']:.3f} m off the route on average"
         title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
-        renderer = trained.renderer
         views = renderer.poses[:, :2] if isinstance(renderer, DatabaseViews) else None
-        from ..reports.maps import write_overview
-
-        write_overview(renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, views=views, title=title)
+        write_overview(renderer.world, out / PICTURE, route=route, walk=trajectory.xy, views=views, title=title)
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
         partial.write_text(json.dumps(summary | {"settings": settings}, indent=2, default=str) + "\n")
