@@ -33,7 +33,7 @@ STEPS = 158  # of a walk of 8 m
 
 
 def sweep_file(folder: Path, runs: int) -> Path:
-    """A sweep file that asks for about so many runs: models, worlds, starts and noise."""
+    """A sweep file that asks for about that number of runs: models, worlds, starts and noise."""
     path = folder / "sweep.toml"
     path.write_text(
         f"[axes]\nmodel = {json.dumps(MODELS)}\nworld-seed = {{ from = 1, to = {max(1, round(runs / PER_WORLD))} }}\n"

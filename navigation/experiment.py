@@ -244,20 +244,14 @@ class Experiment(Surroundings):
         yield from (step for (step,) in steps_of([self], trained) if step is not None)
 
     @contextmanager
-    def opened_renderer(self) -> Iterator["tuple[Renderer, Route]"]:
-        """Open the world, find the route, and check that the walk begins inside; the renderer is closed with the block."""
+    def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
+        """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
         from .walk import check_inside
 
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
         with self.open_renderer(world) as renderer:
             log.info(f"renderer: {renderer.backend}")
-            yield renderer, route
-
-    @contextmanager
-    def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
-        """Open a renderer as `opened_renderer` does, and let the navigator learn the route."""
-        with self.opened_renderer() as (renderer, route):
             yield self.train(renderer, route, progress)
 
     def run(self, progress: Progress = no_progress) -> "Trajectory":

@@ -132,9 +132,8 @@ def find_candidates(corners, n, view, work, found):
     """
     zero, one, start, stop = np.float32(0), np.float32(1), np.float32(view.start), np.float32(view.stop)
     wide, per_rad, _, top, rows_per_rad = _in_float32(view)
-    turns, bottom_row = np.float32(1 / view.width), np.float32(view.height - 1)
     pad, row_pad = _ERROR_32 * per_rad + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
-    half = np.float32(0.5) * wide - pad
+    turns, bottom_row, half = np.float32(1 / view.width), np.float32(view.height - 1), np.float32(0.5) * wide - pad
     _find_corners(corners, n, view, work)
     for i in range(n):  # without branches, so that it is vectorised
         ca, cb, cc = work[i], work[LEAF + i], work[2 * LEAF + i]

@@ -64,13 +64,13 @@ def test_filters_that_are_added_and_left_out_across_tiles():
     expected = by_rolling(views, filters, biases)
     beginning = NearestFilters(filters[:5], biases[:5])
     other = beginning.appended(-filters[:40], biases[:40])  # stored where the next ones would be
-    grown = beginning
+    combined = beginning
     for first, last in pairwise((5, 21, 64, 100, 130, 150)):
-        grown = grown.appended(filters[first:last], biases[first:last])
+        combined = combined.appended(filters[first:last], biases[first:last])
     expected_of_other = by_rolling(views, torch.cat([filters[:5], -filters[:40]]), torch.cat([biases[:5], biases[:40]]))
     assert torch.equal(other.nearest(views)[1], expected_of_other.argmin(dim=2))
     for some in (slice(None), slice(3), slice(17, 140), slice(63, 64), slice(64, 129), slice(149, 150)):
-        least, index = grown.nearest(views, some)
+        least, index = combined.nearest(views, some)
         assert torch.equal(index, expected[..., some].argmin(dim=2) + (some.start or 0))
         assert torch.allclose(least.double(), expected[..., some].amin(dim=2), atol=1e-4)
 

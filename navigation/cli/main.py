@@ -61,7 +61,7 @@ COMMANDS: dict[str, Any] = {
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 2 and one line for bad input, 1 when a check finds something, 130 when interrupted."""
     if arguments is None:
-        collect_rarely()
+        tune_python()
         arguments = sys.argv[1:]
     if arguments == ["--version"]:
         print(f"tussock {version('tussock')}")
@@ -166,13 +166,16 @@ def choice_of(commands: dict[str, Any]) -> Any:
     return Union[*kinds, Annotated[None, tyro.conf.Suppress]]  # the last so that one command is a choice, too
 
 
-def collect_rarely() -> None:
-    """Look for garbage in cycles rarely, and not at the end. Imports make a million objects, none of them garbage: to look through these
-    again and again takes a second of `tussock run`, half of it at the end. It changes the whole process.
+def tune_python() -> None:
+    """Settings for a process of its own: look for garbage in cycles rarely, and not at the end, and let threads take turns often.
+
+    Imports make a million objects, none of them garbage. To look through these again and again takes a second of `tussock run`, half of
+    it at the end.
     """
     gc.set_threshold(100_000)
     atexit.register(gc.freeze)
-    sys.setswitchinterval(0.0002)  # s; with 0.005, a thread that imports stops one that encodes views for that long at each array
+    # Seconds. With the usual 0.005, a thread that imports stops one that encodes views for that long at each array.
+    sys.setswitchinterval(0.0002)
 
 
 @contextmanager

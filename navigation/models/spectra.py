@@ -112,16 +112,15 @@ class Chunk:
             less = values < least
             least[less], index[less] = values[less], self.filters.start + which[less]
             return
-        found = {}
+        by_tile = {}
 
         def work(*arguments) -> None:
-            own = np.full(self._shape, np.inf, np.float32), np.zeros(self._shape, np.int64)
-            nearest(*arguments, *own)
-            found[arguments[-2]] = own
+            *_, begin, _ = arguments
+            by_tile[begin] = np.full(self._shape, np.inf, np.float32), np.zeros(self._shape, np.int64)
+            nearest(*arguments, *by_tile[begin])
 
         self._in_threads(work)
-        for begin in sorted(found):
-            values, which = found[begin]
+        for _, (values, which) in sorted(by_tile.items(), key=lambda item: item[0]):
             less = values < least.numpy()
             least.numpy()[less], index.numpy()[less] = values[less], self.filters.start + which[less]
 

@@ -59,27 +59,32 @@ def record_run(
     given = (experiment.world, experiment.route, experiment.route_database, experiment.grid_database)
     files = [Path(each) for each in given if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
-    with experiment.opened_renderer() as (renderer, route):
-        with ThreadPoolExecutor(1) as thread:  # what is needed only later is imported while the views are drawn
-            thread.map(import_module, IMPORTED_LATER)
-            trained = experiment.train(renderer, route, learning)
-        from ..reports.maps import write_overview
-
+    thread = ThreadPoolExecutor(1)  # imports what is needed only later while the world is made and views are drawn
+    thread.map(import_module, IMPORTED_LATER)
+    with thread, experiment.opened(learning) as trained:
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
         settings = _settings(experiment, trained)
         trajectory, seconds = _record(experiment, trained, out, viewer, settings, walking)
         summary = trajectory.summary()
         summary |= {"seconds": seconds, "steps_per_second": summary["steps"] / seconds, "recording": RECORDING}
-        write_route(route, out / ROUTE)
-        deviation = f"{summary['mean_deviation_m']:.3f} m off the route on average"
-        title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
-        views = renderer.poses[:, :2] if isinstance(renderer, DatabaseViews) else None
-        write_overview(renderer.world, out / PICTURE, route=route, walk=trajectory.xy, views=views, title=title)
+        write_route(trained.route, out / ROUTE)
+        _draw(trained, trajectory, summary, out)
     # Last of all: a folder with a summary holds a whole run.
     with replacing(out / SUMMARY) as partial:
         partial.write_text(json.dumps(summary | {"settings": settings}, indent=2, default=str) + "\n")
     (out / UNFINISHED).unlink()
     return summary | {"recording": str(out / RECORDING)}
+
+
+def _draw(trained: TrainedNavigator, trajectory: Trajectory, summary: dict[str, Any], out: Path) -> None:
+    """Draw the walk from above."""
+    from ..reports.maps import write_overview
+
+    renderer = trained.renderer
+    deviation = f"{summary['mean_deviation_m']:.3f} m off the route on average"
+    title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
+    views = renderer.poses[:, :2] if isinstance(renderer, DatabaseViews) else None
+    write_overview(renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, views=views, title=title)
 
 
 def _record(

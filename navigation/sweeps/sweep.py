@@ -23,7 +23,7 @@ from tussock.world.errors import FileError, InputError, MissingDependencyError, 
 from tussock.world.progress import Progress, no_progress
 
 from ..experiment import Experiment
-from ..experiment_keys import Keys, route_key, training_key, views_key
+from ..experiment_keys import Keys
 from ..experiment_settings import TYPES, run_command, settings_of
 from ..recording.run_folder import record_run
 from . import work
@@ -169,14 +169,13 @@ def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Fut
     Workers forget a world, views and a model when the last walk that needs them is done: this holds on to those of the last one only.
     """
     needs: dict[str, Future] = {}
+    known = Keys()
     for number, keys in enumerate(side_by_side(missing, _workers(client))):
         runs = [missing[key] for key in keys]
         first, earlier, given = runs[0], needs, []
         needs = {}
         options = {"priority": -number}  # worlds are finished one after the other
-        steps = {route_key: Experiment.open_world_and_route, views_key: draw, training_key: learn}
-        for key_of_step, step in steps.items():
-            key = key_of_step(first)
+        for key, step in zip(known.shared(first), (Experiment.open_world_and_route, draw, learn), strict=True):
             needs[key] = earlier.get(key) or client.submit(step, first, *given, key=key, **options)
             given = [needs[key]]
         yield client.submit(walk, runs, *given, key=f"walks-{tokenize(*keys)}", **options), keys
