@@ -21,7 +21,7 @@ from tussock.world.registry import Registry
 from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
-from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views, Visible
+from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Round, Scale, Views, Visible
 from .feature_mask import FeatureMask
 from .overlap import remark_on_overlap
 
@@ -40,7 +40,7 @@ BATCH_PIXELS = 108_000  # of views that are encoded at once: they stay in the pr
 
 @attrs.frozen
 class Encoding:
-    """A chain of steps, applied in order.
+    """A chain of steps, applied in order. What they make of a view is rounded to multiples of 1/4096 (`Round`).
 
     Attributes:
         steps: One that takes views (grey or foreground-mask, say), then any number of others. A resize by 1 is left out.
@@ -72,14 +72,22 @@ class Encoding:
 
     def _encode(self, views: Views) -> Images:
         images = views
-        for step in self.steps:
+        for step in self._applied:
             images = step(images)
         return images.astype(np.float32, copy=False)
+
+    @property
+    def _applied(self) -> tuple[EncodingStep, ...]:
+        """The steps, and the rounding of what they make of a view: before it is scaled down, so that this loses nothing."""
+        last = len(self.steps)
+        while isinstance(self.steps[last - 1], Scale):
+            last -= 1
+        return *self.steps[:last], Round(), *self.steps[last:]
 
     def bounds(self, height: int, width: int) -> tuple[tuple[int, int], float, float]:
         """Shape (h, w) of the feature image of a view of height x width, and its least and greatest value, but for rounding."""
         images, low, high = np.zeros((1, height, width, 4), np.uint8), 0.0, 1.0
-        for step in self.steps:
+        for step in self._applied:
             images = step(images)
             unknown = (-np.inf, np.inf)
             low, high = step.bounds(low, high, images.size) if isinstance(step, EncodingStep) else unknown

@@ -21,6 +21,8 @@ Views = UInt8[np.ndarray, "n height width channels"]
 Images = Float32[np.ndarray, "n h w"]
 Visible = Bool[np.ndarray, "_ _"]
 
+LEVELS = 4096  # of the values of a feature image from 0 to 1; a view has 256
+
 
 class EncodingStep(ABC):
     """One step of an encoding. Its parameters are numbers, in the order in which a chain lists them.
@@ -273,15 +275,33 @@ class Normalise(EncodingStep):
     name: ClassVar[str] = "normalise"
 
     def __call__(self, images: Images) -> Images:
-        centred = images - images.mean(axis=(1, 2), keepdims=True)
-        deviation = centred.std(axis=(1, 2), keepdims=True)
+        centred = images - images.mean(axis=(1, 2), keepdims=True, dtype=np.float64)
+        deviation = np.sqrt(np.square(centred).mean(axis=(1, 2), keepdims=True))
         # Where there is hardly any contrast, the rounding of the mean would lead out of the bounds.
         low, high = self.bounds(0.0, 1.0, images.shape[1] * images.shape[2])
-        return (centred / np.where(deviation > 1e-6, deviation, np.inf)).clip(low, high)
+        return (centred / np.where(deviation > 1e-6, deviation, np.inf)).clip(low, high).astype(np.float32)
 
     def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
         most = float(np.sqrt(pixels - 1))  # of one pixel that differs from all others
         return -most, most
+
+
+@attrs.frozen
+class Round(PixelStep):
+    """Each value rounded to a multiple of 1 / LEVELS.
+
+    Where rounding differs from processor to processor, it goes no further. And sums of products of such values in float64 are exact in any order, so
+    that two views that differ equally from a third do so on every processor.
+    """
+
+    def __call__(self, images: Images) -> Images:
+        levels = images * np.float32(LEVELS)
+        np.rint(levels, out=levels)
+        levels *= np.float32(1 / LEVELS)
+        return levels
+
+    def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
+        return np.floor(low * LEVELS) / LEVELS, np.ceil(high * LEVELS) / LEVELS
 
 
 STEPS = (Grey, ForegroundMask, Blur, Resize, Sample, Widen, Scale, Invert, Clahe, VerticalEdges, Normalise)

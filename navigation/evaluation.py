@@ -13,7 +13,7 @@ from tussock.world.geometry import Bounds, Route, wrap_angle
 from tussock.world.progress import Progress, no_progress
 
 from .encoding import Encoding
-from .models.base import FamiliarityModel, Images
+from .models.base import FamiliarityModel, Images, SnapshotModel
 from .scan import best_turn, scan_window
 
 BATCH = 64  # views rendered, encoded and compared at once
@@ -119,10 +119,10 @@ def recovered_headings(
     """
     if len(views) == 0:
         return np.empty(0)
-    familiarity = model.scan(views).cpu().numpy()
     turns = np.zeros(len(facing)) if about is None else wrap_angle(about - facing)
-    windows = np.stack([scan_window(familiarity.shape[1], scan, turn) for turn in turns])
-    return wrap_angle(facing + best_turn(familiarity, windows))
+    windows = np.stack([scan_window(views.shape[2], scan, turn) for turn in turns])
+    scans = model.match(views, windows)[0] if isinstance(model, SnapshotModel) else model.scan(views)
+    return wrap_angle(facing + best_turn(scans.cpu().numpy(), windows))
 
 
 def heading_errors(

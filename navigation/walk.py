@@ -21,7 +21,7 @@ from tussock.world.geometry import Pose, Route, place_text, wrap_angle
 from tussock.world.scene import World
 from tussock.world.terrain import Terrain
 
-from .body import Body
+from .body import Body, rounded
 from .encoding import Encoding
 from .steering.navigator import Images, Look, Motion, Navigator, check_motion
 from .stop_check import StopCheck
@@ -51,7 +51,7 @@ class Step:
         familiarity: (w,) Of every rotation, turned left by 0, 1, .. columns; None where the navigator does not scan.
         scanned: (w,) Which of these rotations the navigator compared; None likewise.
         aim: Turn that the navigator decided on (rad, left positive).
-        turn: Turn that the body made: the aim and noise (rad).
+        turn: Turn that the body made: the aim and noise (rad), to a heading that is a multiple of 0.01 degrees.
         match: Index of the learned view that was recognised; None where the model keeps none.
         progress: Share of the learned sequence, 0 to 1, that the navigator believes to have walked; None where it does not know.
         view_distance: Distance from the entry of the image database whose view it sees (m); None in a world.
@@ -235,7 +235,8 @@ class Walker:
         stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
         aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
         noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
-        turn = float(wrap_angle(aim + noise))
+        facing = rounded(pose.turned(aim + noise))
+        turn = float(wrap_angle(facing.heading - pose.heading))
         put_back = stopping.put_back and self.reason in RECOVERABLE and self.index < self.step_limit
         step = Step(
             index=self.index,
@@ -252,7 +253,7 @@ class Walker:
             view_distance=self.view_distance,
             deviation=self.deviation,
             along=self.along,
-            error=float(wrap_angle(pose.heading + turn - self.route_heading)),
+            error=float(wrap_angle(facing.heading - self.route_heading)),
             reason=None if put_back else self.reason,
             reset=self.reset,
             failure=None if self.reason is StopReason.ARRIVED else self.reason,
@@ -263,7 +264,7 @@ class Walker:
         if put_back:
             self.pose = self.stop_check.put_back()
         elif not self.ended:
-            self.pose = pose.turned(turn).moved(share * body.step_length)
+            self.pose = rounded(facing.moved(share * body.step_length))
             self.stop_check.walked(share)
         self.index += 1
         return step

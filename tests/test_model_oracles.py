@@ -73,6 +73,23 @@ def test_perfect_memory_finds_the_brute_force_headings():
     assert np.allclose(scan.max(dim=1).values, -np.sqrt(brute.min(axis=1)), rtol=1e-6)
 
 
+@given(st.integers(1, 90), st.integers(1, 3), st.integers(1, 4), st.integers(4, 12), st.integers(0, 999))
+def test_whole_numbers_decide_between_rotations_and_snapshots_that_are_alike(m, n, h, w, seed):
+    random = np.random.default_rng(seed)
+    levels = random.integers(-2, 3, (m + n, h, w))  # so few that many differences are equal
+    windows = random.random((n, w)) < 0.5
+    windows[:, 0] = True
+    snapshots, queries = torch.from_numpy(levels / 4096).float().split([m, n])
+    familiarity, match = PerfectMemory().fit(snapshots + 1).match(queries + 1, windows)
+    for v, (query, window) in enumerate(zip(levels[m:], windows, strict=True)):
+        squared = np.array([np.square(np.roll(query, k, axis=1) - levels[:m]).sum(axis=(1, 2)) for k in range(w)])
+        best = np.where(window, squared.min(axis=1), squared.max() + 1).argmin()
+        assert torch.where(torch.from_numpy(window), familiarity[v], -torch.inf).argmax() == best
+        for k in (best - 1, best, (best + 1) % w):
+            assert match[v, k] == squared[k].argmin()
+            assert familiarity[v, k] == -np.float32(np.sqrt(squared[k].min() / 4096**2 / (h * w)))
+
+
 @pytest.mark.parametrize("make", [PerfectMemory, Chain])
 def test_snapshot_models_give_the_view_that_they_recognised(make):
     assert isinstance(make(), SnapshotModel)

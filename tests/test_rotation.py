@@ -50,11 +50,29 @@ def test_the_nearest_filter_is_the_one_with_the_least_response(size, seed, data)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(spectra, "FILTERS", data.draw(st.integers(1, m)))
         patch.setattr(spectra, "VIEWS", data.draw(st.integers(1, n)))
-        least, index = NearestFilters(filters, biases).nearest(views, among)
+        least, index, _ = NearestFilters(filters, biases).nearest(views, torch.zeros(n), among).parts
     expected = by_rolling(views, filters, biases)
     assert torch.allclose(least.double(), expected[..., among].amin(dim=2), atol=1e-4)
     assert ((index >= among.start) & (index < among.stop)).all()
     assert torch.allclose(least.double(), expected.gather(2, index[..., None])[..., 0], atol=1e-4)
+
+
+@given(sizes, st.integers(0, 1000), st.data())
+def test_it_is_doubtful_where_another_response_is_as_low_within_the_tolerance(size, seed, data):
+    n, m, h, w = size
+    views, filters = random_images(n, h, w, seed), random_images(m, h, w, seed + 1)
+    copies = filters.repeat(data.draw(st.integers(1, 90)), 1, 1)[torch.randperm(m)] if m > 1 else filters
+    filters = torch.cat([filters, copies])
+    biases = torch.arange(float(len(filters))) / len(filters)
+    tolerance = torch.full((n,), data.draw(st.floats(0.01, 2)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(spectra, "FILTERS", data.draw(st.integers(1, m)))
+        nearest = NearestFilters(filters, biases).nearest(views, tolerance)
+    above = by_rolling(views, filters, biases)
+    above -= above.amin(dim=2, keepdim=True)
+    for inside, surely in ((tolerance - 1e-3, True), (tolerance + 1e-3, False)):
+        doubtful = (above <= inside[:, None, None]).sum(dim=2) > 1
+        assert (nearest.doubtful[doubtful] if surely else ~nearest.doubtful[~doubtful]).all()
 
 
 def test_filters_that_are_added_and_left_out_across_tiles():
@@ -68,9 +86,10 @@ def test_filters_that_are_added_and_left_out_across_tiles():
     for first, last in pairwise((5, 21, 64, 100, 130, 150)):
         combined = combined.appended(filters[first:last], biases[first:last])
     expected_of_other = by_rolling(views, torch.cat([filters[:5], -filters[:40]]), torch.cat([biases[:5], biases[:40]]))
-    assert torch.equal(other.nearest(views)[1], expected_of_other.argmin(dim=2))
+    nothing = torch.zeros(3)
+    assert torch.equal(other.nearest(views, nothing).index, expected_of_other.argmin(dim=2))
     for some in (slice(None), slice(3), slice(17, 140), slice(63, 64), slice(64, 129), slice(149, 150)):
-        least, index = combined.nearest(views, some)
+        least, index, _ = combined.nearest(views, nothing, some).parts
         assert torch.equal(index, expected[..., some].argmin(dim=2) + (some.start or 0))
         assert torch.allclose(least.double(), expected[..., some].amin(dim=2), atol=1e-4)
 
@@ -106,9 +125,9 @@ def test_threads_and_batches_change_responses_by_no_more_than_the_stated_roundin
         for number in (1, 2, 5):
             torch.set_num_threads(number)
             bank, nearest = FilterBank(filters), NearestFilters(filters, torch.zeros(m))
-            together, least = bank.responses(views), nearest.nearest(views)[0]
+            together, least = bank.responses(views), nearest.nearest(views, torch.zeros(n)).least
             assert torch.equal(bank.responses(views), together)  # the same threads and batch: the same bytes
-            assert torch.equal(nearest.nearest(views)[0], least)
+            assert torch.equal(nearest.nearest(views, torch.zeros(n)).least, least)
             for responses in (together, torch.cat([bank.responses(view[None]) for view in views])):
                 assert ((responses - expected).abs() <= tolerance).all()
             assert ((least - expected.amin(dim=2)).abs() <= tolerance.amax(dim=2)).all()

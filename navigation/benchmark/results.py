@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import llvmlite.binding
 import numpy as np
 
 from tussock.world.atomic import replacing
@@ -78,6 +79,7 @@ class Result:
         entry: Its name; for a model with a name its spec.
         encoding: Of the views that it got.
         tussock: The version that walked.
+        processor: On which it walked, as LLVM names it. On another, learned networks may take other steps.
         runs: A line for each.
         memory_bytes: The most that it had learned in a world; None where that is not known.
         times: The means of TIMES, which differ from result to result.
@@ -87,6 +89,7 @@ class Result:
     entry: str = text()
     encoding: str = text()
     tussock: str = text()
+    processor: str = text()
     runs: Sequence[Line] = attrs.field()
     memory_bytes: int | None = whole(None, low=0, optional=True)
     times: Mapping[str, float] = attrs.field()
@@ -117,7 +120,7 @@ class Result:
 
     def to_json(self) -> str:
         """The text of its file: the runs at the end, one in each line."""
-        head = {name: getattr(self, name) for name in ("benchmark", "entry", "encoding", "tussock")}
+        head = {name: getattr(self, name) for name in ("benchmark", "entry", "encoding", "tussock", "processor")}
         head |= self.scores() | {"memory_bytes": self.memory_bytes, "times": dict(self.times)}
         lines = ",\n".join(f"  {json.dumps(attrs.asdict(run))}" for run in self.runs)
         return f'{json.dumps(head, indent=1)[:-2]},\n "runs": [\n{lines}\n ]\n}}\n'
@@ -166,6 +169,7 @@ def result_of(
         entry=entry,
         encoding=encoding,
         tussock=version("tussock"),
+        processor=llvmlite.binding.get_host_cpu_name(),
         runs=list(map(line_of, runs, results)),
         memory_bytes=max(sizes, default=None),
         times={name: float(np.mean([each[column] for each in done])) for name, column in TIMES.items() if done},
@@ -219,7 +223,7 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
             raise ValueError("no runs")
         times = {name: float(seconds) for name, seconds in content["times"].items()}
         rest: dict[str, Any] = {
-            name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "memory_bytes")
+            name: content[name] for name in ("benchmark", "entry", "encoding", "tussock", "processor", "memory_bytes")
         }
         rest["encoding"] = current_encoding(rest["encoding"])
         result = Result(**rest, runs=lines, times=times)

@@ -21,6 +21,7 @@ from .registry import MODELS
 from .rotations import in_batches
 
 Scans = Float32[torch.Tensor, "n w"]
+Windows = Bool[np.ndarray, "n w"]  # the rotations of each view that a scan chooses from
 Learned = dict[str, torch.Tensor]
 Shapes = dict[str, tuple[int | None, ...]]
 Self = TypeVar("Self", bound="Model")
@@ -48,8 +49,13 @@ class FamiliarityModel(Protocol):
 class SnapshotModel(FamiliarityModel, Protocol):
     """A model that keeps views and so can tell which of them it recognised."""
 
-    def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
-        """`scan`, and the index of the learned view that each rotation resembles most."""
+    def match(self, views: Images, windows: Windows | None = None) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+        """`scan`, and the index of the learned view that each rotation resembles most.
+
+        Args:
+            views: (n, h, w)
+            windows: (n, w) Rotations that will be chosen from, which a model may compare more exactly; None means all.
+        """
         ...
 
 

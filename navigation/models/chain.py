@@ -54,8 +54,8 @@ class Chain(PerfectMemory):
     def _difference_between_positions(self) -> float:
         pick = torch.linspace(0, len(self.snapshots) - 1, min(SAMPLE, len(self.snapshots))).round().long()
         sample = self.snapshots[pick] - (self._level if self.mask is None else 0)
-        squares = energies(sample, None)
-        correlations = FilterBank(sample).responses(sample)
+        squares = energies(sample.double(), None)
+        correlations = FilterBank(sample.double()).responses(sample)
         # What a mask hid of a snapshot is not known: then it is compared as it was seen, at rotation 0.
         correlation = correlations.amax(dim=1) if self.mask is None else correlations[:, 0]
         pairs = torch.triu_indices(len(sample), len(sample), 1).unbind()
@@ -101,7 +101,7 @@ class ChainWalk:
         view, allowed_ = chain._on_device(view), chain._on_device(torch.as_tensor(allowed))
         reach = 1.0 if self.active is None else chain.window
         while True:
-            (familiarity,), (index,) = chain._nearest(view[None], self._within(reach))
+            (familiarity,), (index,) = chain._nearest(view[None], allowed[None], self._within(reach))
             best = int(torch.where(allowed_, familiarity, -torch.inf).argmax())
             matches = -float(familiarity[best]) <= chain.max_difference
             if matches or reach >= 1:

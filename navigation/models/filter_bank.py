@@ -21,10 +21,10 @@ agree within 1e-6 sqrt(w) |V| |F| (rounding).
 import copy
 
 import torch
-from jaxtyping import Float, Float32, Float64, Int64
+from jaxtyping import Float, Float32, Float64
 
 from ..feature_mask import FeatureMask
-from .spectra import Spectra
+from .spectra import Nearest, Spectra
 
 
 class FilterBank:
@@ -101,20 +101,23 @@ class NearestFilters:
         return combined
 
     def nearest(
-        self, views: Float32[torch.Tensor, "n h w"], among: slice = slice(None)
-    ) -> tuple[Float32[torch.Tensor, "n w"], Int64[torch.Tensor, "n w"]]:
+        self,
+        views: Float32[torch.Tensor, "n h w"],
+        tolerance: Float32[torch.Tensor, " n"],
+        among: slice = slice(None),
+    ) -> Nearest:
         """The least response to each rotation of each view, and the filter that gives it.
 
         Args:
             views: (n, h, w)
+            tolerance: (n,) By how much responses to a view differ that rounding might have put into another order.
             among: The filters to compare.
 
         Returns:
-            The responses, and the indices of the filters; of responses that are equal but for rounding, any.
+            Of responses that are equal but for rounding, any; then it is doubtful.
         """
-        n, width = len(views), views.shape[2]
-        least = views.new_full((n, width), torch.inf)
-        index = torch.zeros(n, width, dtype=torch.int64, device=views.device)
+        nearest = Nearest.nothing((len(views), views.shape[2]), views)
         for chunk in self._spectra.chunks(views, self._biases, among):
-            chunk.update_least(least[chunk.views], index[chunk.views])
-        return least, index
+            for part in chunk.nearest(tolerance[chunk.views]):
+                nearest[chunk.views].take(part, chunk.filters.start, tolerance[chunk.views])
+        return nearest

@@ -11,7 +11,7 @@ from tussock.world.errors import SettingError
 
 from ..feature_mask import energies, is_partial
 from ..overlap import BLOCK, overlaps
-from .base import Images, Learned, Scans, Shapes, model
+from .base import Images, Learned, Scans, Shapes, Windows, model
 from .checks import check_scan
 from .filter_bank import FilterBank, NearestFilters
 from .growing import Growing
@@ -24,6 +24,7 @@ FILTERS = 1000  # snapshots whose responses behind a mask are computed at once; 
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
 ROUNDING = 1e-6
+DECIMALS = 8  # of squared distances in float64, so that rounding does not decide between equal ones
 
 
 @model
@@ -31,8 +32,9 @@ class PerfectMemory(IncrementalModel):
     """Keeps every view; familiarity is minus the RMS difference from the most similar one.
 
     Equation 1 of the thesis (section 4.3), exactly: the distance |v - s|^2 = |v|^2 - 2 v . s + |s|^2 needs one correlation, and where
-    rounding could change which rotation is the best, it is computed again directly. With a mask it is that of the visible pixels, in
-    float64. Memory grows with the number of views.
+    rounding could change which rotation or which snapshot is the best, it is computed again directly. Encoded views are multiples of
+    1/4096, whose float64 sums are exact in any order, so every processor decides alike. With a mask it is the distance of the visible
+    pixels, in float64. Memory grows with the number of views.
 
     Where parts of images are unknown, the difference is that over what both show (see `Overlap`). Rotations that share too little of
     it with every snapshot are not compared: they are as familiar as the least familiar one of the others.
@@ -48,12 +50,17 @@ class PerfectMemory(IncrementalModel):
         """The views it keeps, as the eye saw them."""
         return self._learned["snapshots"]
 
-    def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+    def match(self, views: Images, windows: Windows | None = None) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which snapshot is the most similar at each rotation."""
         check_scan(views, self.shape, is_partial(self.mask))
         if len(views) == 0:
             return self.scan(views), torch.empty(0, views.shape[2], dtype=torch.int64)
-        familiarity, index = zip(*(self._nearest(self._on_device(batch)) for batch in in_batches(views)), strict=True)
+        batches, begin, parts = in_batches(views), 0, []
+        for batch in batches:
+            some = None if windows is None else windows[begin : begin + len(batch)]
+            parts.append(self._nearest(self._on_device(batch), some))
+            begin += len(batch)
+        familiarity, index = zip(*parts, strict=True)
         return torch.cat(familiarity), torch.cat(index)
 
     def _begin(self, height: int, width: int) -> Learned:
@@ -111,21 +118,32 @@ class PerfectMemory(IncrementalModel):
     def _scan(self, views: Images) -> Scans:
         return self._nearest(views)[0]
 
-    def _nearest(self, views: Images, among: slice = slice(None)) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
-        """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation."""
+    def _nearest(
+        self, views: Images, windows: Windows | None = None, among: slice = slice(None)
+    ) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+        """Minus the RMS difference from, and the index of, the most similar of some snapshots, at each rotation.
+
+        Args:
+            views: (n, h, w)
+            windows: (n, w) Rotations whose order rounding must not change; None means all.
+            among: The snapshots to compare.
+        """
         if self.mask is not None:
             return self._nearest_known(views) if self.mask.partial else self._nearest_seen(views, among)
         height, width = views.shape[1:]
         centred = views - self._level
         assert self._filters is not None
-        responses, index = self._filters.nearest(centred, among)
         of_views = energies(centred, None)[:, 0]
-        squared = (of_views[:, None] + responses).cpu().numpy()
-        tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max()).cpu().numpy()
-        undecided = squared <= (squared.min(axis=1) + tolerance)[:, None]
-        _rescore(views.cpu().numpy(), self._on_cpu, index.cpu().numpy(), undecided, squared)
-        familiarity = -np.sqrt(squared / np.float32(height * width))
-        return self._on_device(torch.from_numpy(familiarity)), index
+        tolerance = ROUNDING * width**0.5 * (of_views + self._energies[among].max())
+        nearest = self._filters.nearest(centred, tolerance, among)
+        squared = (of_views[:, None].double() + nearest.least).cpu().numpy()
+        allowed = np.ones(squared.shape, dtype=bool) if windows is None else windows
+        first, last, _ = among.indices(len(self._on_cpu))
+        doubts = tolerance.cpu().numpy(), nearest.doubtful.cpu().numpy()
+        index = nearest.index.cpu().numpy()
+        _settle(views.cpu().numpy(), self._on_cpu, first, last, allowed, *doubts, squared, index)
+        familiarity = -np.sqrt(squared.clip(min=0) / (height * width)).astype(np.float32)
+        return self._on_device(torch.from_numpy(familiarity)), self._on_device(torch.from_numpy(index))
 
     def _nearest_seen(self, views: Images, among: slice) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """The same behind a mask: what is seen of a view, and so its |v|^2, differs from rotation to rotation."""
@@ -134,17 +152,20 @@ class PerfectMemory(IncrementalModel):
         of_views = energies(views, self.mask)
         least, index = torch.full_like(of_views, torch.inf), torch.zeros_like(of_views, dtype=torch.int64)
         for k, ((bank, squares), some) in enumerate(zip(self._banks, compared.split(FILTERS), strict=True)):
-            distances = (squares - 2 * bank.exact(views)).where(some, torch.inf)
+            distances = (squares - 2 * bank.exact(views)).round(decimals=DECIMALS).where(some, torch.inf)
             values, which = distances.min(dim=2)
             index = (which + k * FILTERS).where(values < least, index)
             least = torch.minimum(values, least)
-        squared = (of_views + least).clamp(min=0)
+        squared = (of_views.round(decimals=DECIMALS) + least).clamp(min=0)
         return -(squared / self._size(*views.shape[1:])).sqrt().float(), index
 
     def _nearest_known(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """The same over what a view and each snapshot both show."""
         each_view = views.split(1)  # so that its bytes do not depend on the others
-        blocks = [torch.cat([each.squared(view) for view in each_view]).min(dim=2) for each in self._overlaps]
+        blocks = [
+            torch.cat([each.squared(view).round(decimals=DECIMALS) for view in each_view]).min(dim=2)
+            for each in self._overlaps
+        ]
         squared, which = torch.stack([each.values for each in blocks]).min(dim=0)
         indices = torch.stack([each.indices + k * BLOCK for k, each in enumerate(blocks)])
         compared = squared.isfinite()
@@ -156,21 +177,45 @@ class PerfectMemory(IncrementalModel):
         return -squared.where(compared, farthest).sqrt().float(), indices.gather(0, which[None])[0]
 
 
-@compiled(fastmath={"reassoc"})
-def _rescore(views, snapshots, index, undecided, squared):
-    """Compute squared distances (n, w) directly where rounding leaves undecided which of a view is the least, and next to these."""
+@compiled
+def _settle(views, snapshots, first, last, allowed, tolerance, doubtful, squared, index):
+    """Compute squared distances (n, w) directly where rounding leaves undecided which of the allowed is the least, and next to these.
+
+    Where another of the snapshots `first` to `last` may be as near, all of them are compared.
+    """
     n, height, width = views.shape
+    turned, needed = np.empty((height, width)), np.empty(width, np.bool_)
     for v in range(n):
+        least = np.inf
         for turn in range(width):
-            if (
-                undecided[v, turn] or undecided[v, turn - 1] or undecided[v, (turn + 1) % width]
-            ):  # a heading is interpolated from three
-                snapshot = snapshots[index[v, turn]]
-                total = 0.0
-                for i in range(height):  # the view rolled right by `turn`
-                    for j in range(turn):
-                        total += (np.float64(views[v, i, width - turn + j]) - snapshot[i, j]) ** 2
-                    for j in range(width - turn):
-                        total += (np.float64(views[v, i, j]) - snapshot[i, turn + j]) ** 2
-                squared[v, turn] = total
-            squared[v, turn] = max(squared[v, turn], np.float32(0.0))
+            if allowed[v, turn]:
+                least = min(least, squared[v, turn])
+        needed[:] = False
+        for turn in range(width):
+            if allowed[v, turn] and squared[v, turn] <= least + tolerance[v]:
+                for near in range(turn - 1, turn + 2):  # a heading is interpolated from three
+                    needed[near % width] = True
+        for turn in range(width):
+            if not needed[turn]:
+                continue
+            turned[:, turn:], turned[:, :turn] = views[v, :, : width - turn], views[v, :, width - turn :]
+            if not doubtful[v, turn]:
+                squared[v, turn] = _distance(turned, snapshots[index[v, turn]], np.inf)
+                continue
+            squared[v, turn] = np.inf
+            for k in range(first, last):
+                distance = _distance(turned, snapshots[k], squared[v, turn])
+                if distance < squared[v, turn]:
+                    squared[v, turn], index[v, turn] = distance, k
+
+
+@compiled(fastmath={"reassoc"})
+def _distance(view, snapshot, limit):
+    """Squared distance of two images (h, w), or any number over the limit if it is over it."""
+    total = 0.0
+    for i in range(view.shape[0]):
+        for j in range(view.shape[1]):
+            total += (view[i, j] - snapshot[i, j]) ** 2
+        if total > limit:
+            break
+    return total

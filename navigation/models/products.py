@@ -178,8 +178,10 @@ def respond(rows, inverse, tiles, biases, first, begin, end, responses):
 
 
 @compiled
-def nearest(rows, inverse, tiles, biases, first, begin, end, least, index):
+def nearest(rows, inverse, tiles, biases, first, begin, end, tolerance, least, index, doubtful):
     """Where a response is below `least` (n, w), change it to the least response, and `index` (n, w) to its filter, from 0 to m - 1.
+
+    `doubtful` (n, w) becomes true where another response is within `tolerance` (n,) of the least one.
 
     All are float32. Their order is that of their bits as whole numbers, but for those below 0, whose bits are inverted here. The
     compiler compares several whole numbers at once, and floats one by one.
@@ -200,11 +202,18 @@ def nearest(rows, inverse, tiles, biases, first, begin, end, least, index):
                 for j in range(len(bias)):
                     low = min(low, ordered[j] ^ (ordered[j] >> 31 & MAX))
                 low ^= low >> 31 & MAX
-                if np.int32(low).view(np.float32) < least[v, k]:
+                lowest = np.int32(low).view(np.float32)
+                if not lowest <= least[v, k] + tolerance[v]:
+                    continue
+                within, count = lowest + tolerance[v], np.int32(0)
+                for j in range(len(bias)):
+                    count += responses[j] <= within
+                doubtful[v, k] = count > 1 or lowest >= least[v, k] - tolerance[v]
+                if lowest < least[v, k]:
                     j = 0
                     while ordered[j] != low:
                         j += 1
-                    least[v, k], index[v, k] = responses[j], column + start + j
+                    least[v, k], index[v, k] = lowest, column + start + j
 
 
 @compiled(fastmath={"reassoc"})

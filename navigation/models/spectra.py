@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float64, Int64
+from jaxtyping import Bool, Float, Float64, Int64
 
 from ..threads import in_threads
 from .growing import Tiles
@@ -74,6 +74,42 @@ class Spectra:
 
 
 @dataclass(frozen=True)
+class Nearest:
+    """Of some filters, that with the least response to each rotation of some views.
+
+    Attributes:
+        least: The least response.
+        index: The filter that gives it.
+        doubtful: Whether another filter's response is the same, but for rounding.
+    """
+
+    least: Float[torch.Tensor, "n w"]
+    index: Int64[torch.Tensor, "n w"]
+    doubtful: Bool[torch.Tensor, "n w"]
+
+    @classmethod
+    def nothing(cls, shape: tuple[int, int], like: torch.Tensor) -> "Nearest":
+        """Of no filters, with a shape (n, w), and the type and device of a tensor."""
+        least = like.new_full(shape, torch.inf)
+        return cls(least, torch.zeros_like(least, dtype=torch.int64), torch.zeros_like(least, dtype=torch.bool))
+
+    @property
+    def parts(self) -> tuple[torch.Tensor, ...]:
+        """Least responses, filters and doubts."""
+        return self.least, self.index, self.doubtful
+
+    def __getitem__(self, views: slice) -> "Nearest":
+        return Nearest(*(each[views] for each in self.parts))
+
+    def take(self, other: "Nearest", first: int, tolerance: Float[torch.Tensor, " n"]) -> None:
+        """Take other filters in, in place; their numbers begin at `first`."""
+        less, close = other.least < self.least, (other.least - self.least).abs() <= tolerance[:, None]
+        self.least[less], self.index[less] = other.least[less], first + other.index[less]
+        self.doubtful[less] = other.doubtful[less]
+        self.doubtful[close] = True
+
+
+@dataclass(frozen=True)
 class Chunk:
     """Some views and filters whose products are computed at once.
 
@@ -105,24 +141,27 @@ class Chunk:
         self._in_threads(lambda *arguments: respond(*arguments, responses.numpy()))
         return responses
 
-    def update_least(self, least: Float[torch.Tensor, "n w"], index: Int64[torch.Tensor, "n w"]) -> None:
-        """Where a response to a rotation of the views is below `least`, change it to the least one, and `index` to its filter."""
+    def nearest(self, tolerance: Float[torch.Tensor, " n"]) -> Iterator["Nearest"]:
+        """The filters with the least response to each rotation of the views, in one part or several; their numbers begin at 0.
+
+        Args:
+            tolerance: (n,) By how much responses differ that rounding might have put into another order.
+        """
         if not self._compiled:
-            values, which = self.by_torch().min(dim=2)
-            less = values < least
-            least[less], index[less] = values[less], self.filters.start + which[less]
+            responses = self.by_torch()
+            least, index = responses.min(dim=2)
+            close = responses <= (least + tolerance[:, None])[..., None]
+            yield Nearest(least, index, close.sum(dim=2) > 1)
             return
         by_tile = {}
 
         def work(*arguments) -> None:
             *_, begin, _ = arguments
-            by_tile[begin] = np.full(self._shape, np.inf, np.float32), np.zeros(self._shape, np.int64)
-            nearest(*arguments, *by_tile[begin])
+            by_tile[begin] = Nearest.nothing(self._shape, self.rows)
+            nearest(*arguments, tolerance.numpy(), *(each.numpy() for each in by_tile[begin].parts))
 
         self._in_threads(work)
-        for _, (values, which) in sorted(by_tile.items(), key=lambda item: item[0]):
-            less = values < least.numpy()
-            least.numpy()[less], index.numpy()[less] = values[less], self.filters.start + which[less]
+        yield from (each for _, each in sorted(by_tile.items(), key=lambda item: item[0]))
 
     def absolute(self) -> Float[torch.Tensor, "n w"]:
         """Sum of the absolute responses of the filters to each rotation of the views."""

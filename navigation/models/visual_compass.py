@@ -5,7 +5,9 @@ from jaxtyping import Int64
 
 from tussock.world.errors import SettingError
 
-from .base import Images, Learned, Model, Scans, Shapes, model
+from ..feature_mask import is_partial
+from .base import Images, Learned, Model, Scans, Shapes, Windows, model
+from .checks import check_scan
 from .perfect_memory import PerfectMemory
 
 
@@ -22,9 +24,10 @@ class VisualCompass(Model):
     takes_partial = True
     dtypes = {"index": torch.int64}  # noqa: RUF012
 
-    def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+    def match(self, views: Images, windows: Windows | None = None) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and the index of the last learned view throughout."""
-        familiarity = self.scan(views)
+        check_scan(views, self.shape, is_partial(self.mask))
+        familiarity, _ = self._memory.match(views, windows)
         return familiarity, self.learned["index"].expand(familiarity.shape)
 
     def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:

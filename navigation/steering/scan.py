@@ -68,6 +68,6 @@ class Scan:
             familiarity, matches = zip(*(memory.look(view, window) for memory, view, window in rows), strict=True)
             return torch.stack(familiarity).cpu().numpy(), torch.stack(matches).cpu().numpy()
         if isinstance(self.model, SnapshotModel):
-            familiarity, matches = self.model.match(views)
+            familiarity, matches = self.model.match(views, windows)
             return familiarity.cpu().numpy(), matches.cpu().numpy()
         return self.model.scan(views).cpu().numpy(), None

@@ -1,0 +1,51 @@
+"""The same decisions on every processor: what libraries compute differently on others changes no step of a walk."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+# Walks of the test bed with one world (or with all), and a digest of their poses.
+WALKS = """
+import hashlib, sys
+from tussock.navigation.benchmark import QUICK
+
+model, count, threads = sys.argv[1:]
+poses = hashlib.sha256()
+for run in QUICK.sweep(model).experiments[: int(count)]:
+    walk = run.replace(threads=int(threads)).run()
+    poses.update(repr([walk.column(name) for name in ("x_m", "y_m", "heading_deg")]).encode())
+print(poses.hexdigest())
+"""
+SETTINGS = {
+    "torch": {"ATEN_CPU_CAPABILITY": "default"},
+    "onednn": {"ONEDNN_MAX_CPU_ISA": "SSE41"},
+    "mkl": {"MKL_ENABLE_INSTRUCTIONS": "SSE4_2"},
+    "numpy": {"NPY_DISABLE_CPU_FEATURES": " ".join(np._core._multiarray_umath.__cpu_dispatch__)},  # type: ignore[attr-defined]
+    "opencv": {"OPENCV_CPU_DISABLE": "SSE4.1,SSE4.2,AVX,FP16,AVX2,FMA3,AVX_512F,AVX512_SKX"},
+    "numba": {"NUMBA_CPU_NAME": "generic"},
+}
+LIBRARIES = {name: value for key, settings in SETTINGS.items() if key != "numba" for name, value in settings.items()}
+
+
+def digest(model: str, count: int, threads: int = 1, **settings: str) -> str:
+    arguments = [sys.executable, "-c", WALKS, model, str(count), str(threads)]
+    done = subprocess.run(arguments, env=os.environ | settings, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()[-1]
+
+
+@pytest.mark.parametrize("model", ["perfect-memory", "chain"])
+def test_older_instructions_change_no_step(model):
+    assert digest(model, 1, 2, **LIBRARIES) == digest(model, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["perfect-memory", "chain"])
+def test_no_setting_of_the_processor_changes_a_step_of_the_test_bed(model):
+    expected = digest(model, 12)
+    differing = [name for name, settings in SETTINGS.items() if digest(model, 12, **settings) != expected]
+    assert differing == []
+    assert digest(model, 12, threads=2) == expected
