@@ -290,8 +290,8 @@ class Normalise(EncodingStep):
 class Round(PixelStep):
     """Each value rounded to a multiple of 1 / LEVELS.
 
-    Where rounding differs from processor to processor, it goes no further. And sums of products of such values in float64 are exact in any order, so
-    that two views that differ equally from a third do so on every processor.
+    What differs in the last bits from processor to processor goes no further. And in float64, sums of products of such values are
+    exact in any order: where two views differ equally from a third, they do so on every processor.
     """
 
     def __call__(self, images: Images) -> Images:

@@ -158,7 +158,7 @@ class Experiment(Surroundings):
 
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
-        return route.start.moved(0.0, self.start_offset)
+        return route.start.moved(0.0, self.start_offset).rounded()
 
     def train(
         self,

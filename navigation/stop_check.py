@@ -42,7 +42,7 @@ class StopCheck:
         spacing = self.stopping.waypoint_spacing
         self.furthest = min((np.floor(self.furthest / spacing + 1e-9) + 1) * spacing, self.route.length)
         self.since = 0.0
-        return Pose(*self.route.at(self.furthest)[0].tolist())
+        return Pose(*self.route.at(self.furthest)[0].tolist()).rounded()
 
     def _at_goal(self, pose: Pose) -> bool:
         goal = self.route.goal

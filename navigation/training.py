@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
-from tussock.world.geometry import Bounds, Route, wrap_angle
+from tussock.world.geometry import Bounds, Route, rounded
 from tussock.world.progress import Progress, no_progress
 
 from .encoding import Encoding
@@ -53,7 +53,7 @@ def training_poses(
     views = route.resampled(spacing)
     poses = views.poses[::every]
     if learning_walk == 0:
-        return poses
+        return rounded(poses)
     heading = poses[:, 2]
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
     ahead = views.at(views.arc[::every] + AHEAD)[:, :2]
@@ -65,7 +65,7 @@ def training_poses(
             batches.append(np.column_stack([xy, np.arctan2(aim[:, 1], aim[:, 0])]))
     batches.append(poses)  # last, so that the last view of all is the route's own at its end
     together = np.stack(batches, axis=1).reshape(-1, 3)  # in the order of the route
-    together[:, 2] = wrap_angle(together[:, 2])
+    together = rounded(together)
     return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
 
 

@@ -21,7 +21,7 @@ from tussock.world.geometry import Pose, Route, place_text, wrap_angle
 from tussock.world.scene import World
 from tussock.world.terrain import Terrain
 
-from .body import Body, rounded
+from .body import Body
 from .encoding import Encoding
 from .steering.navigator import Images, Look, Motion, Navigator, check_motion
 from .stop_check import StopCheck
@@ -235,7 +235,7 @@ class Walker:
         stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
         aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
         noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
-        facing = rounded(pose.turned(aim + noise))
+        facing = pose.turned(aim + noise).rounded()
         turn = float(wrap_angle(facing.heading - pose.heading))
         put_back = stopping.put_back and self.reason in RECOVERABLE and self.index < self.step_limit
         step = Step(
@@ -264,7 +264,7 @@ class Walker:
         if put_back:
             self.pose = self.stop_check.put_back()
         elif not self.ended:
-            self.pose = rounded(facing.moved(share * body.step_length))
+            self.pose = facing.moved(share * body.step_length).rounded()
             self.stop_check.walked(share)
         self.index += 1
         return step

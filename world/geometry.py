@@ -21,6 +21,8 @@ from jaxtyping import Float
 from .errors import SettingError
 from .settings import MAX_COORDINATE
 
+HEADING_STEP_DEG = 0.01  # of rounded headings
+
 
 def wrap_angle(angle):
     """Wrap an angle, or an array of angles, to [-pi, pi) (rad)."""
@@ -71,6 +73,10 @@ class Pose(NamedTuple("Pose", [("x", float), ("y", float), ("heading", float)]))
             heading = float(wrap_angle(heading))
         return super().__new__(cls, x, y, heading)
 
+    def rounded(self) -> "Pose":
+        """As `rounded`."""
+        return Pose(*rounded(np.array(self)).tolist())
+
     def turned(self, angle: float) -> "Pose":
         """The same position, turned left by `angle` (rad)."""
         return Pose(self.x, self.y, float(wrap_angle(self.heading + angle)))
@@ -79,6 +85,15 @@ class Pose(NamedTuple("Pose", [("x", float), ("y", float), ("heading", float)]))
         """The same heading, moved `forward` and to the `left` (m)."""
         c, s = np.cos(self.heading), np.sin(self.heading)
         return Pose(float(self.x + forward * c - left * s), float(self.y + forward * s + left * c), self.heading)
+
+
+def rounded(poses: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Poses whose headings are multiples of 0.01 degrees, and whose positions are whole nanometres.
+
+    The last bits of a sine, or of what a scan interpolates, differ from processor to processor. Along a walk they would add up.
+    """
+    degrees = np.rint(np.degrees(poses[..., 2:]) / HEADING_STEP_DEG) * HEADING_STEP_DEG
+    return np.concatenate([np.rint(poses[..., :2] * 1e9) / 1e9, wrap_angle(np.radians(degrees))], axis=-1)
 
 
 class Bounds(NamedTuple):

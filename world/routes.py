@@ -67,7 +67,8 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
                 and clearance(world, route).min() >= MIN_CLEARANCE
                 and _first_off_ground(world, route) is None
             ):
-                return Route.through(route if goal is None else route[::-1])
+                points = np.round(route, 9)  # to a nanometre: further digits differ from processor to processor
+                return Route.through(points if goal is None else points[::-1])
     raise InputError(
         f"found no route of {length:.2f} m in the field ({field}) that keeps {100 * MIN_CLEARANCE:g} cm clear of plants; "
         "ask for a shorter one or for less vegetation"
