@@ -7,8 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import random_poses, random_world
 
+from tussock.navigation import encoding_steps
 from tussock.navigation.block_means import block_means
 from tussock.navigation.encoding import PRESETS, Encoding
+from tussock.navigation.encoding_steps import Clahe, Grey, Normalise
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError, SettingError
@@ -26,6 +28,7 @@ CHAINS = [
     "grey | normalise | scale 0.25",
     "foreground-mask | blur 2 | vertical-edges | resize 3 | normalise",
 ]
+LEVELS = 4096  # values are rounded to multiples of 1 / LEVELS
 # With tiles, which turn with the eye.
 EQUALISED = ["grey | clahe 2 4", "grey | invert | clahe 3.5 4 | resize 3", "foreground-mask | clahe 40 1"]
 
@@ -52,7 +55,7 @@ def test_rolling_the_view_by_whole_tiles_rolls_the_equalised(views, chain):
     for turned in range(1, tiles + 1):
         rolled = encoding(np.roll(views, turned * 120 // tiles, axis=2)).numpy()
         away = np.abs(rolled - np.roll(features, turned * features.shape[2] // tiles, axis=2))
-        assert away.max() < 1.01 / 255
+        assert away.max() < 1.01 / 255 + 1 / LEVELS
         assert away.mean() < 1e-5  # a level here and there, where the sum of four tiles' is midway between two
 
 
@@ -68,31 +71,48 @@ def test_a_batch_equals_its_views_one_by_one(views, chain):
     assert np.allclose(encoding(views), np.concatenate([encoding(view[None]) for view in views]), atol=1e-6)
 
 
+def rounded(images):
+    return np.rint(np.asarray(images, dtype=np.float64) * LEVELS) / LEVELS
+
+
+@pytest.mark.parametrize("chain", [each for each in CHAINS + EQUALISED if "scale" not in each])
+def test_values_are_multiples_of_a_level_and_exact_to_it(views, chain):
+    encoding = Encoding.parse(chain)
+    features = encoding(views).numpy()
+    assert np.array_equal(features, rounded(features))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(encoding_steps, "LEVELS", 2**20)
+        finer = encoding(views).numpy()
+    assert np.abs(features - finer).max() < 0.51 / LEVELS
+
+
+def test_scaling_comes_after_rounding_and_loses_nothing(views):
+    features = Encoding.parse("grey | normalise")(views)
+    assert np.array_equal(Encoding.parse("grey | normalise | scale 0.001")(views), features * np.float32(0.001))
+
+
 def test_grey_is_opencvs_grey(views):
     theirs = np.stack([cv2.cvtColor(np.ascontiguousarray(view[..., :3]), cv2.COLOR_RGB2GRAY) for view in views])
     assert np.abs(Encoding.parse("grey")(views).numpy() * 255 - theirs).max() < 1.01
 
 
 def test_samples_are_opencvs_default_resize(views):
-    grey = Encoding.parse("grey")(views).numpy()
-    theirs = np.stack([cv2.resize(image, (30, 8)) for image in grey])
-    assert np.array_equal(Encoding.parse("grey | sample 4")(views).numpy(), theirs)
+    theirs = np.stack([cv2.resize(image, (30, 8)) for image in Grey()(views)])
+    assert np.array_equal(Encoding.parse("grey | sample 4")(views).numpy(), rounded(theirs))
 
 
 def test_sky_mask_is_alpha_and_its_estimate_from_colours_is_close(views):
     mask = Encoding.parse("foreground-mask")
     exact = mask(views).numpy()
-    assert np.array_equal(exact, views[..., 3] / np.float32(255))
+    assert np.array_equal(exact, rounded(views[..., 3] / 255))
     estimated = mask(np.ascontiguousarray(views[..., :3])).numpy()
     assert np.abs(estimated - exact).mean() < 0.05
 
 
 def test_resizing_averages_blocks():
     image = np.random.default_rng(0).integers(0, 256, (1, 12, 24, 3)).astype(np.uint8)
-    whole = Encoding.parse("grey")(image).numpy()
-    assert np.allclose(
-        Encoding.parse("grey | resize 3")(image), whole.reshape(1, 4, 3, 8, 3).mean(axis=(2, 4)), atol=1e-6
-    )
+    means = Grey()(image).reshape(1, 4, 3, 8, 3).mean(axis=(2, 4))
+    assert np.array_equal(Encoding.parse("grey | resize 3")(image), rounded(means))
     assert Encoding.parse("grey | resize 7")(image).shape == (1, 2, 4)  # rounded, at least four columns
 
 
@@ -114,7 +134,7 @@ def test_edges_are_what_a_loop_finds(views):
     mask = views[..., 3].astype(float) / 255
     edges = Encoding.parse("foreground-mask | vertical-edges")(views).numpy()
     for column in range(120):
-        assert np.allclose(edges[..., column], abs(mask[..., (column + 1) % 120] - mask[..., column]), atol=1e-6)
+        assert np.array_equal(edges[..., column], rounded(abs(mask[..., (column + 1) % 120] - mask[..., column])))
 
 
 def test_inverting_is_its_own_inverse_and_makes_white_black(views):
@@ -125,9 +145,10 @@ def test_inverting_is_its_own_inverse_and_makes_white_black(views):
 
 @pytest.mark.parametrize("columns", [1, 2, 5])
 def test_every_nth_of_the_widened_pixels_is_one_of_a_coarser_view(views, columns):
-    grey = Encoding.parse("grey")(views).numpy()
+    grey = Grey()(views)
     coarse = grey.reshape(*grey.shape[:2], -1, columns).mean(axis=3)
-    assert np.allclose(Encoding.parse(f"grey | widen {columns}")(views).numpy()[..., ::columns], coarse, atol=1e-6)
+    widened = Encoding.parse(f"grey | widen {columns}")(views).numpy()
+    assert np.abs(widened[..., ::columns] - coarse).max() < 0.51 / LEVELS
 
 
 def test_scaling_a_normalised_view_sets_its_deviation(views):
@@ -140,10 +161,10 @@ def test_scaling_a_normalised_view_sets_its_deviation(views):
 @pytest.mark.parametrize(("clip", "tiles"), [(2, 4), (0.5, 5), (40, 2), (256, 3)])
 def test_equalised_images_are_opencvs_of_the_ring_laid_out_thrice(views, clip, tiles):
     views = views[:, : 30 // tiles * tiles]  # else OpenCV makes other tiles
-    levels = np.rint(Encoding.parse("grey")(views).numpy() * 255).astype(np.uint8)
+    levels = np.rint(Grey()(views) * 255).astype(np.uint8)
     thrice = cv2.createCLAHE(clip, (3 * tiles, tiles))
     theirs = np.stack([thrice.apply(np.tile(image, 3))[:, 120:240] for image in levels]) / np.float32(255)
-    ours = Encoding.parse(f"grey | clahe {clip} {tiles}")(views).numpy()
+    ours = Clahe(clip, tiles)(Grey()(views))
     assert np.abs(ours - theirs).max() < 1.01 / 255
     assert np.abs(ours - theirs).mean() < 1e-5  # a level here and there, by rounding
     # And, but near the seam, of the image as it is.
@@ -175,9 +196,9 @@ def test_tiles_that_do_not_divide_the_columns_are_refused(views):
 
 
 def test_normalised_images_have_mean_0_and_variance_1_and_blank_ones_are_0(views):
-    features = Encoding.parse("grey | normalise")(views).numpy()
-    assert np.allclose(features.mean(axis=(1, 2)), 0, atol=1e-5)
-    assert np.allclose(features.std(axis=(1, 2)), 1, atol=1e-4)
+    features = Normalise()(Grey()(views))
+    assert np.allclose(features.mean(axis=(1, 2)), 0, atol=1e-7)
+    assert np.allclose(features.std(axis=(1, 2)), 1, atol=1e-6)
     assert (Encoding.parse("grey | normalise")(np.full((1, 4, 8, 3), 77, np.uint8)).numpy() == 0).all()
 
 

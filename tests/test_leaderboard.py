@@ -38,8 +38,8 @@ TINY = Benchmark(
     base=BASE.replace(eye=Eye(width=60, height=16, samples=1), training__spacing=0.1),
 )  # fmt: skip
 DIGESTS = {
-    "tussock-1": "71c2f5d9b5c3f8504a8a885bacb00cdd88cd308d88832c1fb1288d99e0823757",
-    "tussock-1-quick": "ad70ca16e4ff30954f4428cbdf4f993e16f8b7c8eae10edd59f8c47696666f72",
+    "tussock-2": "71c2f5d9b5c3f8504a8a885bacb00cdd88cd308d88832c1fb1288d99e0823757",
+    "tussock-2-quick": "ad70ca16e4ff30954f4428cbdf4f993e16f8b7c8eae10edd59f8c47696666f72",
 }
 
 
@@ -70,6 +70,7 @@ def made_up(entry: str, *lines: Line, **more) -> Result:
         "benchmark": "made-up-1",
         "encoding": "foreground-mask",
         "tussock": "0",
+        "processor": "made-up",
         "memory_bytes": 1_500_000,
         "times": {},
     }
@@ -123,7 +124,7 @@ def test_the_digest_depends_on_every_setting_of_a_run(tmp_path):
 
 
 def test_its_runs_are_all_combinations():
-    assert BENCHMARK.name == "tussock-1"
+    assert BENCHMARK.name == "tussock-2"
     runs = BENCHMARK.sweep("random").experiments
     different = {(run.world, run.seed, run.body.heading_noise, run.start_offset) for run in runs}
     assert len(different) == len(runs) == len(BENCHMARK)
@@ -279,7 +280,7 @@ def test_results_that_do_not_compare_are_refused_before_the_first_run(tmp_path, 
     monkeypatch.setattr("tussock.navigation.experiment.Experiment.open_world_and_route", run_none)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "it.json").write_text(made_up("it", line()).to_json())
-    refusal = r"it\.json holds a result of made-up-1 .+ this would be one of tussock-1.+; give another --out"
+    refusal = r"it\.json holds a result of made-up-1 .+ this would be one of tussock-2.+; give another --out"
     for quick in (False, True):
         with pytest.raises(InputError, match=refusal):
             BenchmarkCommand(model="random", out=tmp_path, quick=quick).run()

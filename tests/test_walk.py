@@ -287,7 +287,8 @@ def test_a_learning_walk_looks_ahead_from_both_sides():
     assert np.allclose(poses[:, -1], STRAIGHT.poses[::10])  # the last view is the one at the end of the route
     assert np.allclose(poses[0, :-1, 1] - 1.5, [0.05, -0.05, 0.1, -0.1, 0.2, -0.2])
     for x, y, heading in poses[0]:
-        assert np.isclose(y + np.tan(heading) * (0.5 + AHEAD - x), 1.5)  # each looks at the point AHEAD on the route
+        aim = np.arctan2(1.5 - y, 0.5 + AHEAD - x)  # each looks at the point AHEAD on the route
+        assert abs(heading - aim) <= np.radians(0.0051)
     assert np.allclose(training_poses(STRAIGHT, 0.04, every=3), STRAIGHT.poses[::3])
 
 
@@ -348,7 +349,8 @@ def test_the_trajectory_has_the_familiarity_of_the_rotations_that_were_scanned(r
         trajectory.add(step)
         assert step.scanned.sum() < 10
         assert trajectory.column("familiarity")[-1] == step.familiarity[step.scanned].max()
-    assert trajectory.column("familiarity")[-1] < step.familiarity.max()
+        if step.index == 0:
+            assert trajectory.column("familiarity")[0] < step.familiarity.max()
 
 
 def test_a_trajectory_without_steps_has_a_summary():

@@ -1,0 +1,36 @@
+"""What README and docs print is what was measured."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+NUMBERS = Path(__file__).parents[1] / "docs" / "numbers"
+sys.path.insert(0, str(NUMBERS))
+
+import make  # noqa: E402
+from measurements import MEASUREMENTS  # noqa: E402
+
+
+@pytest.mark.parametrize("page", make.PAGES, ids=lambda path: path.stem)
+def test_a_page_prints_the_numbers_of_the_records(page):
+    text = page.read_text()
+    assert make.written(text, make.records()) == text
+    assert text.count("<!-- number: ") == len(make.NUMBER.findall(text))
+    assert bool(make.NUMBER.findall(text)) == bool(make.ORIGIN.findall(text))  # a reader sees where numbers come from
+
+
+def test_every_measurement_has_a_record_and_a_page():
+    printed = {name for page in make.PAGES for _, name, *_ in make.NUMBER.findall(page.read_text())}
+    assert make.records().keys() == MEASUREMENTS.keys() == printed
+
+
+def test_a_number_that_differs_from_its_record_is_seen():
+    record = {"walk": {"values": {"mean_deviation_m": 0.0123, "steps": 5}, "origin": {}}}
+    page = "it is <!-- number: walk.deviation -->9.9 cm<!-- end of number --> off"
+    assert make.written(page, record) == page.replace("9.9 cm", "1.2 cm")
+
+
+@pytest.mark.slow
+def test_a_measurement_gives_its_record_again(tmp_path):
+    assert MEASUREMENTS["walk"].measure(tmp_path) == make.records()["walk"]["values"]
