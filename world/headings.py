@@ -171,11 +171,13 @@ def diagnose(poses: Float[np.ndarray, "n 3"], read_as: str = "ccw") -> Diagnosis
         return Diagnosis("follows", least)
     if least > OFF and _deviation(np.exp(1j * numbers)) < CONSTANT:
         return Diagnosis("constant", off, None, float(np.angle(np.exp(1j * numbers).mean())))
+    bends = np.abs(wrap_angle(np.diff(path_directions(poses[:, :2]))))
+    unsure = np.median(bends) / 2  # how well the path's direction at a row is known
     if fit.explains(read_as):
-        return Diagnosis("turned", off, best, mean)
+        return Diagnosis("turned", off, best, mean) if abs(mean) > max(SAME, unsure) else Diagnosis("follows", off)
     if best is not None:
         return Diagnosis("perhaps", off, best)
-    return Diagnosis("unrelated" if least > OFF else "follows", off)
+    return Diagnosis("unrelated" if least > OFF and unsure < SAME else "follows", off)
 
 
 def _numbers(heading: Float[np.ndarray, " n"], read_as: str) -> Float[np.ndarray, " n"]:
