@@ -11,14 +11,18 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from PIL import Image as PillowImage
 
 from tussock.world.atomic import replacing
+
+from .layout import fit_texts
 
 STYLE: Any = {"font.family": "DejaVu Sans", "font.size": 9, "svg.hashsalt": "tussock"}  # the same bytes each time
 ROUTE_COLOUR, PATH_COLOUR, CURVE_COLOUR = "#2f6bff", "#e6352b", "#333333"
 GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
 WIDE, TALL = (7.2, 2.9), (7.2, 5.6)  # inches
+HANDLE, CHARACTER = 0.5, 0.075  # inches that a line and a letter take in a legend
 DPI = 130
 
 
@@ -39,6 +43,7 @@ class Image:
 
 def save_figure(figure: Figure, folder: Path, name: str) -> Image:
     """Write a figure as NAME.png and NAME.svg into a folder; give the PNG for a page."""
+    fit_texts(figure)
     png = io.BytesIO()
     figure.savefig(png, dpi=DPI, format="png")
     with replacing(folder / f"{name}.png") as partial:
@@ -51,6 +56,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> Image:
 
 def save_picture(figure: Figure, path: str | os.PathLike) -> None:
     """Write a figure as one file, .png or .svg."""
+    fit_texts(figure)
     with replacing(path) as partial:
         figure.savefig(partial, dpi=120, format=Path(path).suffix.lstrip(".").lower())
 
@@ -72,6 +78,31 @@ def empty_figure(reason: str) -> Figure:
     return figure
 
 
+def legend_above(axes: Axes) -> None:
+    """Explain what is drawn above the figure, where it covers no data, in as many columns as fit."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure = axes.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    column = HANDLE + CHARACTER * max(map(len, labels))
+    columns = max(1, int(figure.get_figwidth() / column))
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns, frameon=False, fontsize=8)
+
+
+def from_zero(axes: Axes) -> None:
+    """Let a vertical axis begin at zero and end above all data, also those of axes that share it and those drawn later.
+
+    `set_ylim(bottom=0)` would fix its end as well, at the data drawn so far.
+    """
+    axes.axhline(0, lw=0).sticky_edges.y.append(0)
+
+
+def label_errors(axes: Axes, label: str = "error (degrees)") -> None:
+    """Make a vertical axis one of errors: from zero, with ticks where people expect them on a circle."""
+    axes.set_ylabel(label)
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 2, 3, 4.5, 5, 9, 10]))
+    from_zero(axes)
+
+
 def draw_over_circle(
     axes: Axes, degrees, values, label: str | None = None, colour: str = CURVE_COLOUR, **style
 ) -> None:
@@ -82,13 +113,11 @@ def draw_over_circle(
 
 
 def draw_lines(axes: Axes, x, curves: Mapping[str, tuple], ylabel: str = "error (degrees)") -> None:
-    """Draw several lines over one axis. curves: values, colour and style, by label."""
+    """Draw several lines of errors over one axis. curves: values, colour and style, by label."""
     for label, (values, colour, style) in curves.items():
         axes.plot(x, values, style, color=colour, label=label, ms=4, lw=1.5)
-    axes.set_ylabel(ylabel)
-    axes.set_ylim(bottom=0)
+    label_errors(axes, ylabel)
     axes.grid(axis="y", color="#00000018")
-    axes.legend(frameon=False, fontsize=8)
 
 
 def draw_panorama(axes: Axes, view: np.ndarray, title: str = "") -> None:

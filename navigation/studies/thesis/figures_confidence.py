@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ...reports.drawing import GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, WIDE, canvas, draw_over_circle
+from ...reports.drawing import GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, WIDE, canvas, draw_over_circle, legend_above
 from ...reports.results import StudyResults
 from .heading_maps import draw_heading_map, heading_maps
 from .items import figure
@@ -38,7 +38,7 @@ def _reversed(results: StudyResults, data: StudyData) -> Figure:
         curve = _curve(results, name, results.numbers["iterations"][1])
         draw_over_circle(axes[0, 1], curve["degrees_off"], curve["confidence"], name, colour)
     axes[0, 1].set_ylabel("confidence")
-    axes[0, 1].legend(frameon=False, fontsize=8)
+    legend_above(axes[0, 1])
     return drawn
 
 
@@ -71,8 +71,9 @@ def _beyond(results: StudyResults, data: StudyData) -> Figure:
     axis.plot(table["median_error_deg_corners"], rows, "o", color=PATH_COLOUR, ms=4, label="in corners")
     axis.plot(table["median_error_deg_straights"], rows, "o", color=GOOD_COLOUR, ms=4, label="on straights")
     axis.set_yticks(rows, [f"{row.model}, {row.encoding}, {row.views}" for row in table.itertuples()])
-    axis.set(xlabel="median error (degrees)", xlim=(0, 180), xticks=range(0, 181, 45))
-    axis.legend(frameon=False, fontsize=8)
+    axis.set_xlabel("median error (degrees)")
+    axis.set_xlim(left=0)
+    legend_above(axis)
     return drawn
 
 

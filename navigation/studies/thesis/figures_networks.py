@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...reports.drawing import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, WIDE, canvas, empty_figure
+from ...reports.drawing import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, WIDE, canvas, empty_figure, from_zero
 from ...reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from ...reports.results import StudyResults
 from .corners import EVERY_6TH, MORE_IN_CORNERS
@@ -93,11 +93,12 @@ def _change(results: StudyResults, data: StudyData) -> Figure:
     drawn, axes = canvas()
     axis, table = axes[0, 0], results.tables["change"]
     axis.plot(table["along_m"], table["rms"], "o-", ms=3, color=CURVE_COLOUR, lw=1.2)
-    axis.set(xlabel="along the route (m)", ylabel="RMS difference (grey levels)", ylim=(0, None))
+    axis.set(xlabel="along the route (m)", ylabel="RMS difference (grey levels)")
+    from_zero(axis)
     other = axis.twinx()
     other.fill_between(table["along_m"], table["turning_deg"], color=PATH_COLOUR, alpha=0.2, lw=0)
     other.set_ylabel("turning (degrees)", color=PATH_COLOUR)
-    other.set_ylim(0, 180)
+    from_zero(other)
     section = table.loc[table["in_section"], "along_m"]
     axis.axvspan(section.min(), section.max(), color="#00000010", lw=0)
     return drawn

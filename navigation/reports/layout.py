@@ -1,0 +1,88 @@
+"""Room for the texts of a figure: matplotlib's layout leaves none for titles and labels that are longer than their axes."""
+
+import textwrap
+from collections.abc import Iterator
+
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+ROUNDS = 6  # of changes and new layouts; two are enough for most figures
+MIN_CHARACTERS = 8  # of a line
+MARGIN = 0.05  # inches around a figure that was too small
+
+
+def fit_texts(figure: Figure) -> None:
+    """Make room for all texts of a finished figure.
+
+    Titles and labels that are longer than their axes are broken into lines, tick labels that would overlap are turned, and where a text
+    still lies outside of the figure, the figure is enlarged.
+    """
+    FigureCanvasAgg(figure)  # measures texts
+    for _ in range(ROUNDS):
+        figure.draw_without_rendering()
+        changes = [_fit_axes(axes) for axes in figure.axes if axes.get_visible() and axes.axison]
+        if not any(changes) and not _enlarge(figure):
+            break
+
+
+def _fit_axes(axes: Axes) -> bool:
+    """Break the title and labels of axes into lines, and turn tick labels; whether anything was changed."""
+    slot = axes.get_position(original=True)  # without what an equal aspect takes away
+    width, height = axes.get_figure(root=True).bbox.size * slot.size
+    changes = [
+        _break_lines(axes.title, width),
+        _break_lines(axes.xaxis.label, width),
+        _break_lines(axes.yaxis.label, height),
+        _turn_tick_labels(axes),
+    ]
+    return any(changes)
+
+
+def _break_lines(text: Text, room: float) -> bool:
+    """Break a text into lines that are no longer than the room for them (pixels)."""
+    before = text.get_text()
+    if not (before and text.get_visible()):
+        return False
+    box = text.get_window_extent()
+    length = box.height if text.get_rotation() == 90 else box.width
+    if length <= room:
+        return False
+    lines = before.split("\n")
+    characters = max(MIN_CHARACTERS, int(max(map(len, lines)) * room / length))
+    text.set_text("\n".join(textwrap.fill(line, characters, break_long_words=False) for line in lines))
+    return text.get_text() != before
+
+
+def _turn_tick_labels(axes: Axes) -> bool:
+    """Turn the labels of a horizontal axis upright where they would overlap."""
+    labels = list(tick_labels(axes.xaxis))
+    if any(label.get_rotation() for label in labels):
+        return False
+    boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
+    if all(left.x1 < right.x0 for left, right in zip(boxes, boxes[1:], strict=False)):
+        return False
+    axes.tick_params(axis="x", labelrotation=90)
+    return True
+
+
+def tick_labels(axis: Axis) -> Iterator[Text]:
+    """The labels of an axis that are drawn: those of ticks within its limits."""
+    low, high = sorted(axis.get_view_interval())
+    slack = 1e-9 * (high - low)
+    for label in axis.get_ticklabels():
+        at = label.get_position()[0 if axis.axis_name == "x" else 1]
+        if label.get_visible() and label.get_text() and low - slack <= at <= high + slack:
+            yield label
+
+
+def _enlarge(figure: Figure) -> bool:
+    """Enlarge a figure by what lies outside of it; whether anything did."""
+    box, size = figure.get_tightbbox(), figure.get_size_inches()
+    outside = [max(0.0, -low) + max(0.0, high - end) for low, high, end in zip(box.min, box.max, size, strict=True)]
+    if max(outside) == 0:
+        return False
+    figure.set_size_inches([end + out + (MARGIN if out else 0) for end, out in zip(size, outside, strict=True)])
+    return True
