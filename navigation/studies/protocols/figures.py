@@ -6,7 +6,16 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ...reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, canvas, from_zero, legend_above
+from ...reports.drawing import (
+    CURVE_COLOUR,
+    GOOD_COLOUR,
+    PATH_COLOUR,
+    ROUTE_COLOUR,
+    SOFT_COLOUR,
+    canvas,
+    from_zero,
+    legend_above,
+)
 from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)

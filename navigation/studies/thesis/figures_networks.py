@@ -3,7 +3,16 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...reports.drawing import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, WIDE, canvas, empty_figure, from_zero
+from ...reports.drawing import (
+    CURVE_COLOUR,
+    PATH_COLOUR,
+    ROUTE_COLOUR,
+    SOFT_COLOUR,
+    WIDE,
+    canvas,
+    empty_figure,
+    from_zero,
+)
 from ...reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from ...reports.results import StudyResults
 from .corners import EVERY_6TH, MORE_IN_CORNERS

@@ -10,6 +10,11 @@ FACTOR = 6  # of resizing (4.3.4)
 SMOOTHING = 1.1  # standard deviation of the Gaussian (pixels of the view), that of OpenCV's 5 x 5 kernel; the thesis does not give it
 ENCODING = Encoding.parse(f"grey | blur {SMOOTHING:g} | sample {FACTOR}")  # sampled as cv2.resize does (4.4.1)
 
+# Why quick runs cannot test claims.
+QUICK_NETWORKS = "with --quick, networks are hardly trained"
+QUICK_SEARCHES = "with --quick, few tunings are searched, and networks are hardly trained"
+QUICK_FACTORS = "with --quick, there are four of the ten resize factors"
+
 
 @settings
 class StudySettings:
