@@ -2,9 +2,9 @@
 
 import textwrap
 from collections.abc import Iterator
+from itertools import pairwise
 
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -23,19 +23,19 @@ def fit_texts(figure: Figure) -> None:
     FigureCanvasAgg(figure)  # measures texts
     for _ in range(ROUNDS):
         figure.draw_without_rendering()
-        changes = [_fit_axes(axes) for axes in figure.axes if axes.get_visible() and axes.axison]
+        changes = [_fit_axes(axes, figure) for axes in figure.axes if axes.get_visible() and axes.axison]
         if not any(changes) and not _enlarge(figure):
             break
 
 
-def _fit_axes(axes: Axes) -> bool:
+def _fit_axes(axes: Axes, figure: Figure) -> bool:
     """Break the title and labels of axes into lines, and turn tick labels; whether anything was changed."""
-    slot = axes.get_position(original=True)  # without what an equal aspect takes away
-    width, height = axes.get_figure(root=True).bbox.size * slot.size
+    slot = axes.get_position(original=True)  # with what an equal aspect takes away
+    room = slot.transformed(figure.transFigure)
     changes = [
-        _break_lines(axes.title, width),
-        _break_lines(axes.xaxis.label, width),
-        _break_lines(axes.yaxis.label, height),
+        _break_lines(axes.title, room.width),
+        _break_lines(axes.xaxis.label, room.width),
+        _break_lines(axes.yaxis.label, room.height),
         _turn_tick_labels(axes),
     ]
     return any(changes)
@@ -58,31 +58,30 @@ def _break_lines(text: Text, room: float) -> bool:
 
 def _turn_tick_labels(axes: Axes) -> bool:
     """Turn the labels of a horizontal axis upright where they would overlap."""
-    labels = list(tick_labels(axes.xaxis))
+    labels = list(tick_labels(axes, 0))
     if any(label.get_rotation() for label in labels):
         return False
     boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
-    if all(left.x1 < right.x0 for left, right in zip(boxes, boxes[1:], strict=False)):
+    if all(left.x1 < right.x0 for left, right in pairwise(boxes)):
         return False
     axes.tick_params(axis="x", labelrotation=90)
     return True
 
 
-def tick_labels(axis: Axis) -> Iterator[Text]:
-    """The labels of an axis that are drawn: those of ticks within its limits."""
+def tick_labels(axes: Axes, direction: int) -> Iterator[Text]:
+    """The labels of the horizontal (0) or vertical (1) axis that are drawn: those of ticks within its limits."""
+    axis = (axes.xaxis, axes.yaxis)[direction]
     low, high = sorted(axis.get_view_interval())
     slack = 1e-9 * (high - low)
     for label in axis.get_ticklabels():
-        at = label.get_position()[0 if axis.axis_name == "x" else 1]
-        if label.get_visible() and label.get_text() and low - slack <= at <= high + slack:
+        if label.get_text() and low - slack <= label.get_position()[direction] <= high + slack:
             yield label
 
 
 def _enlarge(figure: Figure) -> bool:
     """Enlarge a figure by what lies outside of it; whether anything did."""
-    box, size = figure.get_tightbbox(), figure.get_size_inches()
-    outside = [max(0.0, -low) + max(0.0, high - end) for low, high, end in zip(box.min, box.max, size, strict=True)]
-    if max(outside) == 0:
-        return False
-    figure.set_size_inches([end + out + (MARGIN if out else 0) for end, out in zip(size, outside, strict=True)])
-    return True
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    across = max(0.0, -box.x0) + max(0.0, box.x1 - width)
+    up = max(0.0, -box.y0) + max(0.0, box.y1 - height)
+    figure.set_size_inches(width + across + MARGIN * (across > 0), height + up + MARGIN * (up > 0))
+    return max(across, up) > 0

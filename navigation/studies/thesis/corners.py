@@ -218,7 +218,7 @@ def _more_views_help(results: StudyResults) -> Decision:
     rows = results.tables["by_selection"].iloc[:2]
     share = [float(row.recovered_in_section / max(1, row.places_in_section)) for row in rows.itertuples()]
     obtained = {f"share recovered, {EVERY_6TH}": share[0], MORE_IN_CORNERS: share[1]}
-    if not (results.tables["change"]["in_corner"].any() and rows["places_in_section"].iloc[0]):
+    if not (any(results.tables["change"]["in_corner"]) and rows["places_in_section"].iloc[0]):
         return Decision(obtained, None, reason=f"{NO_CORNERS} with grid positions near them")
     tables = (results.tables[f"headings, {name}"] for name in (MORE_IN_CORNERS, EVERY_6TH))
     more, fewer = (
