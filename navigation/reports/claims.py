@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from statistics import median
 from typing import Any, NamedTuple
 
-from .effects import Effect
+from .effects import MIN_UNITS, Effect
 from .results import StudyResults, plain_json
 
 Numbers = dict[str, float]  # by label; a label has the unit in parentheses
@@ -157,22 +157,27 @@ class Outcome:
         return texts | {"published": self.published}
 
 
-def check_claims(claims: Sequence[Claim], runs: Sequence[StudyResults], *, quick: bool = False) -> list[Outcome]:
+def check_claims(
+    claims: Sequence[Claim], runs: Sequence[StudyResults], *, quick: bool = False, few_units: bool = True
+) -> list[Outcome]:
     """Test claims on the results of a study's runs.
 
     Args:
         claims: The claims.
         runs: The results of each run. The published numbers are those for the first one.
         quick: These are quick runs. Claims that these cannot test are not tested.
+        few_units: Also test claims with an effect on fewer than MIN_UNITS units.
 
     Returns:
         The outcome of each claim.
     """
-    return [_check(claim, runs, quick=quick) for claim in claims]
+    return [_check(claim, runs, quick=quick, few_units=few_units) for claim in claims]
 
 
-def _check(claim: Claim, runs: Sequence[StudyResults], *, quick: bool) -> Outcome:
+def _check(claim: Claim, runs: Sequence[StudyResults], *, quick: bool, few_units: bool) -> Outcome:
     decisions = [claim.decide(results) for results in runs]
+    if not few_units:
+        decisions = [_without_few_units(each) for each in decisions]
     if quick and claim.not_quick:
         decisions = [Decision(each.obtained, None, reason=claim.not_quick) for each in decisions]
     return Outcome(
@@ -183,6 +188,14 @@ def _check(claim: Claim, runs: Sequence[StudyResults], *, quick: bool) -> Outcom
         effects=[each.effect for each in decisions],
         reasons=[each.reason for each in decisions],
     )
+
+
+def _without_few_units(decision: Decision) -> Decision:
+    """A decision that is not made where its effect was measured on too few units."""
+    effect = decision.effect
+    if effect is None or effect.units >= MIN_UNITS or decision.holds is None:
+        return decision
+    return decision._replace(holds=None, reason=f"{effect.units} {effect.of}; the test needs {MIN_UNITS}")
 
 
 def count_outcomes(outcomes: Sequence[Outcome]) -> str:

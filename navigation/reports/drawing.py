@@ -11,14 +11,18 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from PIL import Image as PillowImage
 
 from tussock.world.atomic import replacing
 
 from .layout import fit_texts
 
-STYLE: Any = {"font.family": "DejaVu Sans", "font.size": 9, "svg.hashsalt": "tussock"}  # the same bytes each time
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "svg.hashsalt": "tussock",  # the same bytes each time
+}
 ROUTE_COLOUR, PATH_COLOUR, CURVE_COLOUR = "#2f6bff", "#e6352b", "#333333"
 GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
 WIDE, TALL = (7.2, 2.9), (7.2, 5.6)  # inches
@@ -94,12 +98,14 @@ def from_zero(axes: Axes) -> None:
     `set_ylim(bottom=0)` would fix its end as well, at the data drawn so far.
     """
     axes.axhline(0, lw=0).sticky_edges.y.append(0)
+    axes.autoscale_view(scalex=False)
+    if axes.get_ylim()[0] < 0 <= axes.dataLim.y0:  # everything is zero: matplotlib puts that in the middle
+        axes.set_ylim(0, 1, auto=True)
 
 
 def label_errors(axes: Axes, label: str = "error (degrees)") -> None:
-    """Make a vertical axis one of errors: from zero, with ticks where people expect them on a circle."""
+    """Make a vertical axis one of errors, from zero."""
     axes.set_ylabel(label)
-    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 2, 3, 4.5, 5, 9, 10]))
     from_zero(axes)
 
 

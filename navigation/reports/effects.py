@@ -36,7 +36,8 @@ class Effect:
 
 
 def effect_size(label: str, units: int, statistic: Statistic, *, of: str) -> Effect:
-    """An effect with its percentile bootstrap interval; there is none for fewer than MIN_UNITS units.
+    """An effect with its percentile bootstrap interval; there is none for fewer than MIN_UNITS units, and none where all samples agree, as
+    the bootstrap knows nothing of values that were not seen.
 
     Args:
         label: See `Effect`.
@@ -52,5 +53,7 @@ def effect_size(label: str, units: int, statistic: Statistic, *, of: str) -> Eff
     if units >= MIN_UNITS and math.isfinite(value):
         drawn = np.random.default_rng(0).integers(0, units, (SAMPLES, units))
         values = [statistic(sample) for sample in drawn]
-        low, high = np.nanquantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]).tolist()
+        ends = np.nanquantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+        if ends[0] < ends[1]:
+            low, high = ends.tolist()
     return Effect(label=label, value=value, low=low, high=high, units=units, of=of)

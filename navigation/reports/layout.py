@@ -17,8 +17,8 @@ MARGIN = 0.05  # inches around a figure that was too small
 def fit_texts(figure: Figure) -> None:
     """Make room for all texts of a finished figure.
 
-    Titles and labels that are longer than their axes are broken into lines, tick labels that would overlap are turned, and where a text
-    still lies outside of the figure, the figure is enlarged.
+    Titles and labels that are longer than their axes are broken into lines, as are tick labels that would overlap, or these are turned.
+    Where a text still lies outside of the figure, the figure is enlarged.
     """
     FigureCanvasAgg(figure)  # measures texts
     for _ in range(ROUNDS):
@@ -29,14 +29,14 @@ def fit_texts(figure: Figure) -> None:
 
 
 def _fit_axes(axes: Axes, figure: Figure) -> bool:
-    """Break the title and labels of axes into lines, and turn tick labels; whether anything was changed."""
+    """Break the title and labels of axes into lines, or turn them; whether anything was changed."""
     slot = axes.get_position(original=True)  # with what an equal aspect takes away
     room = slot.transformed(figure.transFigure)
     changes = [
         _break_lines(axes.title, room.width),
         _break_lines(axes.xaxis.label, room.width),
         _break_lines(axes.yaxis.label, room.height),
-        _turn_tick_labels(axes),
+        _fit_tick_labels(axes, figure),
     ]
     return any(changes)
 
@@ -56,16 +56,27 @@ def _break_lines(text: Text, room: float) -> bool:
     return text.get_text() != before
 
 
-def _turn_tick_labels(axes: Axes) -> bool:
-    """Turn the labels of a horizontal axis upright where they would overlap."""
+def _fit_tick_labels(axes: Axes, figure: Figure) -> bool:
+    """Break the labels of a horizontal axis into lines where they would overlap; where that is not enough, turn them upright."""
     labels = list(tick_labels(axes, 0))
-    if any(label.get_rotation() for label in labels):
+    if any(label.get_rotation() for label in labels) or not _overlap(labels):
         return False
-    boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
-    if all(left.x1 < right.x0 for left, right in pairwise(boxes)):
-        return False
-    axes.tick_params(axis="x", labelrotation=90)
+    middles = [(box.x0 + box.x1) / 2 for box in map(Text.get_window_extent, labels)]
+    longest = max(label.get_window_extent().width for label in labels)
+    for label in labels:
+        _break_lines(label, min(right - left for left, right in pairwise(sorted(middles))))
+    if _overlap(labels):
+        axes.tick_params(axis="x", labelrotation=90)
+        figure.set_figheight(figure.get_figheight() + longest / figure.dpi)
+    else:
+        axes.set_xticks([label.get_position()[0] for label in labels], [label.get_text() for label in labels])
     return True
+
+
+def _overlap(labels: list[Text]) -> bool:
+    """Whether any two texts in a row overlap."""
+    boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
+    return any(right.x0 <= left.x1 for left, right in pairwise(boxes))
 
 
 def tick_labels(axes: Axes, direction: int) -> Iterator[Text]:
@@ -84,4 +95,4 @@ def _enlarge(figure: Figure) -> bool:
     across = max(0.0, -box.x0) + max(0.0, box.x1 - width)
     up = max(0.0, -box.y0) + max(0.0, box.y1 - height)
     figure.set_size_inches(width + across + MARGIN * (across > 0), height + up + MARGIN * (up > 0))
-    return max(across, up) > 0
+    return bool(across or up)

@@ -6,7 +6,7 @@ from typing import Any
 import jinja2
 
 from .claims import Outcome, Spread
-from .effects import Effect
+from .effects import MIN_UNITS, Effect
 
 
 def render_page(report: Any, images: Mapping[Any, Any]) -> str:
@@ -69,5 +69,6 @@ def format_effects(outcome: Outcome) -> str:
 def _format_effect(effect: Effect) -> str:
     units = f"{effect.units:,} {effect.of}"
     if effect.low != effect.low:
-        return f"{format_value(effect.value)} ({units}: no interval)"
+        alike = "all alike, " if effect.units >= MIN_UNITS else ""
+        return f"{format_value(effect.value)} ({units}: {alike}no interval)"
     return f"{format_value(effect.value)} ({format_value(effect.low)} to {format_value(effect.high)}; {units})"

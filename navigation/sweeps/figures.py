@@ -25,7 +25,8 @@ from .statistics import MEASURES, Interval, axis_label, by_axis, choice_label
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)
 MAX_LABELS = 24  # an axis with more choices has no labels
-MAX_LABEL_LENGTH = 25
+MAX_TICKS = 11  # of numbers, in steps
+MAX_LABEL_LENGTH = 40
 
 
 def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: list[str]) -> Figure:
@@ -63,7 +64,7 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
             colour = COLOURS[number % len(COLOURS)]
             _draw_intervals(panel, positions[known] + shift, values, fmt=style, color=colour, label=label)
     for measure, panel in panels.items():
-        panel.set_ylabel(MEASURES[measure].replace(" (", "\n("))
+        panel.set_ylabel(MEASURES[measure])
         panel.grid(axis="y", color="#00000018")
         if measure == "arrived":
             panel.set_ylim(-0.05, 1.05)
@@ -86,7 +87,8 @@ def _label_axis(axes: Axes, axis: list[str], positions: np.ndarray, labels: list
     """Label a horizontal axis of numbers, or of choices with labels."""
     axes.set_xlabel(axis_label(axis))
     if labels is None:
-        axes.set_xticks(positions if len(positions) <= 12 else positions[:: len(positions) // 10])
+        if np.ptp(positions) <= MAX_TICKS * np.diff(positions).min(initial=np.inf):  # each has room for its number
+            axes.set_xticks(positions)
     elif len(labels) <= MAX_LABELS:
         short = [name if len(name) <= MAX_LABEL_LENGTH else f"{name[: MAX_LABEL_LENGTH - 1]}…" for name in labels]
         axes.set_xticks(positions, short)

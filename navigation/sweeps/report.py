@@ -152,7 +152,8 @@ def arrivals(completed: pd.DataFrame, by: list[str]) -> str:
 
     Args:
         completed: The runs.
-        by: Settings whose choices are told apart, as far as there are not too many; empty for none.
+        by: Settings whose choices are told apart, without parameters where these do not differ alone, as far as there are not too many;
+            empty for none.
 
     Returns:
         The sentence, without its full stop.
@@ -161,7 +162,9 @@ def arrivals(completed: pd.DataFrame, by: list[str]) -> str:
     groups = {choice_label(key): part for key, part in completed.groupby(by, dropna=False, sort=False)} if by else {}
     if not 1 < len(groups) <= MAX_IN_HEADLINE:
         return f"{count} arrived"
-    return f"{count} arrived: {', '.join(f'{label} {_arrived(part)}' for label, part in groups.items())}"
+    short = {label: label.split()[0] for label in groups}
+    names = short if len(set(short.values())) == len(short) else dict(zip(short, short, strict=True))
+    return f"{count} arrived: {', '.join(f'{names[label]} {_arrived(part)}' for label, part in groups.items())}"
 
 
 def _arrived(runs: pd.DataFrame) -> str:

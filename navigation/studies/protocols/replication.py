@@ -69,7 +69,7 @@ def replicate(
     done = run_sweep(sweep, out, workers=workers, progress=progress)
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
-    outcomes = check_claims(protocol.claims, [results])
+    outcomes = check_claims(protocol.claims, [results], few_units=False)
     parts = [*[count_outcomes(outcomes)] * bool(outcomes), arrivals(walks, ["model"])]
     headline = "; ".join(parts) + "."
     report = _report(protocol, results, outcomes, about=about, left_out=left_out, command=command, headline=headline)

@@ -29,7 +29,7 @@ def _short_and_long(results: StudyResults, data: StudyData) -> Figure:
 def _reversed(results: StudyResults, data: StudyData) -> Figure:
     """The positions near straights with the smallest and the largest heading error (circled), and the confidence at every rotation
     there. The network was not trained on views behind it."""
-    drawn, axes = canvas((7.2, 6.0), 1, 2, width_ratios=(1, 1.6))
+    drawn, axes = canvas((7.2, 3.8), 1, 2, width_ratios=(1, 1.6))
     table = results.tables["headings_long"]
     draw_heading_map(axes[0, 0], table, data)
     for name, colour in (("recovered", GOOD_COLOUR), ("reversed", PATH_COLOUR)):

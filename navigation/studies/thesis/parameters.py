@@ -11,9 +11,9 @@ SMOOTHING = 1.1  # standard deviation of the Gaussian (pixels of the view), that
 ENCODING = Encoding.parse(f"grey | blur {SMOOTHING:g} | sample {FACTOR}")  # sampled as cv2.resize does (4.4.1)
 
 # Why quick runs cannot test claims.
-QUICK_NETWORKS = "with --quick, networks are hardly trained"
-QUICK_SEARCHES = "with --quick, few tunings are searched, and networks are hardly trained"
-QUICK_FACTORS = "with --quick, there are four of the ten resize factors"
+QUICK_NETWORKS = "--quick trains networks for a sixth of the iterations, from one start"
+QUICK_SEARCHES = "--quick searches few tunings, with a fifth of the iterations"
+QUICK_FACTORS = "--quick has four of the ten resize factors"
 
 
 @settings
