@@ -99,7 +99,9 @@ def from_zero(axes: Axes) -> None:
     """
     axes.axhline(0, lw=0).sticky_edges.y.append(0)
     axes.autoscale_view(scalex=False)
-    if axes.get_ylim()[0] < 0 <= axes.dataLim.y0:  # everything is zero: matplotlib puts that in the middle
+    if (
+        axes.get_ylim()[0] < 0 == axes.dataLim.y0 == axes.dataLim.y1
+    ):  # everything is zero: matplotlib puts that in the middle
         axes.set_ylim(0, 1, auto=True)
 
 

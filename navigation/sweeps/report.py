@@ -152,8 +152,8 @@ def arrivals(completed: pd.DataFrame, by: list[str]) -> str:
 
     Args:
         completed: The runs.
-        by: Settings whose choices are told apart, without parameters where these do not differ alone, as far as there are not too many;
-            empty for none.
+        by: Settings whose choices are told apart, unless there are too many of them; empty for none. Their parameters are left out where
+            the names alone differ.
 
     Returns:
         The sentence, without its full stop.

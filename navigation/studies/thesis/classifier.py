@@ -12,6 +12,7 @@ from tussock.world.geometry import turn_of_columns
 
 from ...models import MLP, make_model
 from ...reports.claims import Decision, claim
+from ...reports.effects import effect_size
 from ...reports.results import StudyResults
 from . import published
 from .effects import fall_of_median, median_error
@@ -181,7 +182,12 @@ def best_tuning_of(results: StudyResults) -> dict[str, Any]:
 def _accuracies(results: StudyResults) -> Decision:
     """The classifier is nearly perfect on held-out views, both of the first part and of the whole route."""
     accuracies = {f"accuracy, {label}": results.numbers[f"accuracy_{part}"] for part, label in PARTS.items()}
-    return Decision(accuracies, min(accuracies.values()) >= 0.9)
+    views = int(results.tables["report_whole_route"]["support"].iloc[-1])
+    right = np.arange(views) < round(results.numbers["accuracy_whole_route"] * views)
+    effect = effect_size(
+        f"accuracy, {PARTS['whole_route']}", views, lambda drawn: float(right[drawn].mean()), of="held-out views"
+    )
+    return Decision(accuracies, min(accuracies.values()) >= 0.9, effect)
 
 
 @claim(
