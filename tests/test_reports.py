@@ -164,7 +164,7 @@ def with_effect(units: int) -> Claim:
     [
         ([[1.0]] * 16 + [[0.0]] * 4 + [[math.nan]] * 2, "16 of 22 claims hold, 4 do not, 2 not tested"),
         ([[1.0], [0.0]], "1 of 2 claims holds, 1 does not"),
-        ([[math.nan]], "0 of 1 claims hold, 1 not tested"),
+        ([[math.nan]], "none of 1 claims was tested"),
         (
             [[1.0, 1.0], [1.0, 0.0], [0.0, 0.0], [math.nan] * 2],
             "1 of 4 claims holds in all 2 runs, 1 in some, 1 in none, 1 not tested",

@@ -201,6 +201,8 @@ def _without_few_units(decision: Decision) -> Decision:
 def count_outcomes(outcomes: Sequence[Outcome]) -> str:
     """How many claims hold, as in "16 of 22 claims hold, 4 do not, 2 not tested"; over several runs, in how many of them."""
     styles, runs = Counter(each.style for each in outcomes), max(len(each.holds) for each in outcomes)
+    if styles["untested"] == len(outcomes):
+        return f"none of {len(outcomes)} claims was tested"
     verb = "holds" if styles["yes"] == 1 else "hold"
     if runs > 1:
         ends = {"yes": f" of {len(outcomes)} claims {verb} in all {runs} runs", "partly": " in some", "no": " in none"}

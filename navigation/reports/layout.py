@@ -52,8 +52,19 @@ def _break_lines(text: Text, room: float) -> bool:
         return False
     lines = before.split("\n")
     characters = max(MIN_CHARACTERS, int(max(map(len, lines)) * room / length))
-    text.set_text("\n".join(textwrap.fill(line, characters, break_long_words=False) for line in lines))
+    text.set_text("\n".join(_balanced(line, characters) for line in lines))
     return text.get_text() != before
+
+
+def _balanced(line: str, characters: int) -> str:
+    """A line broken into as few as needed, of similar lengths."""
+
+    def broken(width: int) -> list[str]:
+        return textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)
+
+    while characters > MIN_CHARACTERS and len(broken(characters - 1)) == len(broken(characters)):
+        characters -= 1
+    return "\n".join(broken(characters))
 
 
 def _fit_tick_labels(axes: Axes, figure: Figure) -> bool:

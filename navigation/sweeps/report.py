@@ -188,7 +188,7 @@ def _about(table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[st
     choices = [f"{label}: {completed.groupby(names, dropna=False).ngroups}" for label, names in axes.items()]
     count = "all" if len(completed) == len(table) else str(len(completed))
     return {
-        "Runs": f"{len(table)} runs, {count} completed, {int(completed['arrived'].sum())} arrived",
+        "Runs": f"{len(table)} runs, {count} completed",
         "Varied": "; ".join(choices) or "nothing",
         "Equal in all runs": "; ".join(equal) or "everything has its default",
     }
