@@ -45,7 +45,7 @@ def data_along(across: float, up: float) -> tuple[StudyData, pd.DataFrame]:
 @pytest.mark.parametrize("maps", [1, 2, 3])
 def test_maps_of_routes_of_any_shape_have_room_for_their_titles(across, up, maps):
     data, table = data_along(across, up)
-    titles = {f"map {k}": f"the classifier after {10**k:,} iterations" for k in range(maps)}
+    titles = {f"map {k}": f"the classifier of the whole route after {10**k:,} iterations" for k in range(maps)}
     check_figure(heading_maps(dict.fromkeys(titles, table), data, titles))
 
 

@@ -29,7 +29,7 @@ def fit_texts(figure: Figure) -> None:
 
 
 def _fit_axes(axes: Axes, figure: Figure) -> bool:
-    """Break the title and labels of axes into lines, or turn them; whether anything was changed."""
+    """Break the title and labels of axes into lines, turn them, or leave some out; whether anything was changed."""
     slot = axes.get_position(original=True)  # with what an equal aspect takes away
     room = slot.transformed(figure.transFigure)
     changes = [
@@ -37,6 +37,7 @@ def _fit_axes(axes: Axes, figure: Figure) -> bool:
         _break_lines(axes.xaxis.label, room.width),
         _break_lines(axes.yaxis.label, room.height),
         _fit_tick_labels(axes, figure),
+        _thin_tick_labels(axes),
     ]
     return any(changes)
 
@@ -70,13 +71,13 @@ def _balanced(line: str, characters: int) -> str:
 def _fit_tick_labels(axes: Axes, figure: Figure) -> bool:
     """Break the labels of a horizontal axis into lines where they would overlap; where that is not enough, turn them upright."""
     labels = list(tick_labels(axes, 0))
-    if any(label.get_rotation() for label in labels) or not _overlap(labels):
+    if any(label.get_rotation() for label in labels) or not _overlap(labels, 0):
         return False
     middles = [(box.x0 + box.x1) / 2 for box in map(Text.get_window_extent, labels)]
     longest = max(label.get_window_extent().width for label in labels)
     for label in labels:
         _break_lines(label, min(right - left for left, right in pairwise(sorted(middles))))
-    if _overlap(labels):
+    if _overlap(labels, 0):
         axes.tick_params(axis="x", labelrotation=90)
         figure.set_figheight(figure.get_figheight() + longest / figure.dpi)
     else:
@@ -84,10 +85,19 @@ def _fit_tick_labels(axes: Axes, figure: Figure) -> bool:
     return True
 
 
-def _overlap(labels: list[Text]) -> bool:
-    """Whether any two texts in a row overlap."""
-    boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
-    return any(right.x0 <= left.x1 for left, right in pairwise(boxes))
+def _thin_tick_labels(axes: Axes) -> bool:
+    """Leave out every second tick of a vertical axis where their labels would overlap."""
+    labels = list(tick_labels(axes, 1))
+    if not _overlap(labels, 1):
+        return False
+    axes.set_yticks([label.get_position()[1] for label in labels][::2])
+    return True
+
+
+def _overlap(labels: list[Text], direction: int) -> bool:
+    """Whether any two texts in a row (0) or above each other (1) overlap."""
+    ends = sorted(tuple(label.get_window_extent().get_points()[:, direction]) for label in labels)
+    return any(low <= end for (_, end), (low, _) in pairwise(ends))
 
 
 def tick_labels(axes: Axes, direction: int) -> Iterator[Text]:
