@@ -67,7 +67,7 @@ def format_effects(outcome: Outcome) -> str:
 
 
 def _format_effect(effect: Effect) -> str:
-    units = f"{effect.units:,} {effect.of}"
+    units = f"{effect.units:,} {effect.of if effect.units != 1 else effect.of.removesuffix('s')}"
     if effect.low != effect.low:
         alike = "all alike, " if effect.units >= MIN_UNITS else ""
         return f"{format_value(effect.value)} ({units}: {alike}no interval)"
