@@ -1,11 +1,14 @@
 """Figures of reports: every text can be read, and the axes fit what they show."""
 
+from collections.abc import Iterator
+
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
 from figure_laws import check_figure, drawn_texts
 
-from tussock.navigation.reports.drawing import canvas, draw_lines, from_zero, legend_above
+from tussock.navigation.reports.drawing import STYLE, canvas, draw_lines, from_zero, legend_above
 from tussock.navigation.reports.layout import fit_texts
 from tussock.navigation.studies.protocols.figures import boxes_by_model, lines_by_model
 from tussock.navigation.studies.thesis.heading_maps import heading_maps
@@ -22,6 +25,13 @@ MODELS = [
     "chain",
     "rbm",
 ]
+
+
+@pytest.fixture(autouse=True)
+def style() -> Iterator[None]:
+    """Figures as in reports."""
+    with matplotlib.rc_context(STYLE):
+        yield
 
 
 def data_along(across: float, up: float) -> tuple[StudyData, pd.DataFrame]:

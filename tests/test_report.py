@@ -8,12 +8,14 @@ import sys
 import time
 from pathlib import Path
 
+import matplotlib
 import pytest
 from browser import WIDTHS, in_browser
 from figure_laws import check_figure
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.cli.studies import ThesisCommand
+from tussock.navigation.reports.drawing import STYLE
 from tussock.navigation.studies.thesis.figures import FIGURES
 from tussock.navigation.studies.thesis.report import ITEMS
 from tussock.navigation.studies.thesis.studies import STUDIES
@@ -121,7 +123,8 @@ def test_every_figure_can_be_read_and_its_axes_fit_its_data(replication):
     runs, data = command.runs(tuple(STUDIES))
     for item in FIGURES:
         assert item.draw is not None
-        check_figure(item.draw(runs[0][item.study], data))
+        with matplotlib.rc_context(STYLE):
+            check_figure(item.draw(runs[0][item.study], data))
 
 
 @pytest.mark.parametrize("width", WIDTHS)

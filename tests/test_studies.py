@@ -3,6 +3,7 @@
 import dataclasses
 import logging
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,6 +17,7 @@ from sklearn.model_selection import ParameterGrid
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import make_model
 from tussock.navigation.reports.claims import Outcome, check_claims
+from tussock.navigation.reports.drawing import STYLE
 from tussock.navigation.reports.results import StudyResults
 from tussock.navigation.studies.thesis import published
 from tussock.navigation.studies.thesis.classifier import FIRST, held_out_views
@@ -323,7 +325,8 @@ def test_every_text_of_the_figures_can_be_read_and_their_axes_fit_their_data(dat
     for item in FIGURES:
         if item.study in FAST:
             assert item.draw is not None
-            check_figure(item.draw(results[item.study], data))
+            with matplotlib.rc_context(STYLE):
+                check_figure(item.draw(results[item.study], data))
 
 
 # Claims about networks

@@ -19,14 +19,14 @@ from .layout import fit_texts
 
 STYLE: Any = {
     "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.titlesize": 9,
+    "font.size": 10.5,  # of which a telephone shows half
+    "axes.titlesize": "medium",
     "svg.hashsalt": "tussock",  # the same bytes each time
 }
 ROUTE_COLOUR, PATH_COLOUR, CURVE_COLOUR = "#2f6bff", "#e6352b", "#333333"
 GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
 WIDE, TALL = (7.2, 2.9), (7.2, 5.6)  # inches
-HANDLE, CHARACTER = 0.5, 0.075  # inches that a line and a letter take in a legend
+HANDLE, CHARACTER = 0.5, 0.08  # inches that a line and a letter take in a legend
 DPI = 130
 
 
@@ -89,7 +89,7 @@ def legend_above(axes: Axes) -> None:
     assert isinstance(figure, Figure)
     column = HANDLE + CHARACTER * max(map(len, labels))
     columns = max(1, int(figure.get_figwidth() / column))
-    figure.legend(handles, labels, loc="outside upper left", ncols=columns, frameon=False, fontsize=8)
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns, frameon=False, fontsize="small")
 
 
 def from_zero(axes: Axes) -> None:
@@ -133,4 +133,4 @@ def draw_panorama(axes: Axes, view: np.ndarray, title: str = "") -> None:
     image = view[..., :3] if view.ndim == 3 else view
     axes.imshow(image, extent=(180, -180, 0, 75), cmap="gray", aspect="auto", interpolation="nearest")
     axes.set(xticks=range(-180, 181, 90), xlim=(180, -180), yticks=[], xlabel="degrees left of straight ahead")
-    axes.set_title(title, fontsize=9)
+    axes.set_title(title)

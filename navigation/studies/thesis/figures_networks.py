@@ -30,7 +30,7 @@ def _uses_of_views(results: StudyResults, data: StudyData) -> Figure:
     for use, colour in (("not used", SOFT_COLOUR), ("learned", ROUTE_COLOUR), ("held out", PATH_COLOUR)):
         rows = table[table["use"] == use]
         axes[0, 0].plot(rows["x_m"], rows["y_m"], "o", ms=1.5 if use == "not used" else 3.5, color=colour, label=use)
-    axes[0, 0].legend(fontsize=8)
+    axes[0, 0].legend(fontsize="small")
     draw_map(axes[0, 0], data.world, data.route.xy)
     return drawn
 

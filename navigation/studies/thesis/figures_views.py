@@ -57,7 +57,7 @@ def _image_differences(results: StudyResults, data: StudyData) -> Figure:
         from_zero(axis)
         axis.set_xlabel("")
     axes[0, 0].set_ylabel("RMS difference")
-    drawn.supxlabel("degrees left of the reference's heading", fontsize=9)
+    drawn.supxlabel("degrees left of the reference's heading", fontsize="medium")
     return drawn
 
 
@@ -92,7 +92,7 @@ def _ambiguous(results: StudyResults, data: StudyData) -> Figure:
         draw_over_circle(axis, curve["degrees_off"], curve["rms"])
         row = curve.iloc[0]
         position = f"({row['x_m']:.1f}, {row['y_m']:.1f}) m"
-        axis.set_title(f"{position}: {row['minima']:.0f} minima, {row['error_deg']:.0f}° off", fontsize=9)
+        axis.set_title(f"{position}: {row['minima']:.0f} minima, {row['error_deg']:.0f}° off")
     axes[0, 0].set_ylabel("RMS difference")
     return drawn
 
@@ -111,7 +111,7 @@ def _occluded(results: StudyResults, data: StudyData) -> Figure:
     draw_panorama(axes[1, 0], data.route_views[int(row["reference"])], title)
     draw_over_circle(axes[2, 0], table["degrees_off"], table["rms"])
     axes[2, 0].set(ylabel="RMS difference", xlim=(180, -180))  # left on the left, as in the panoramas
-    axes[2, 0].set_title(f"{row['error_deg']:.0f}° off", fontsize=9)
+    axes[2, 0].set_title(f"{row['error_deg']:.0f}° off")
     for axis in axes[:2, 0]:
         axis.set_xlabel("")
     return drawn
