@@ -34,6 +34,7 @@ from tussock.navigation.studies.protocols import (
     routes_in,
 )
 from tussock.navigation.studies.protocols.azevedo2025 import of_walk
+from tussock.navigation.studies.protocols.effects import over_routes
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
 from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
@@ -180,6 +181,17 @@ def test_ardin_by_hand():
 )
 def test_ardins_claims_can_fail(resets, expected):
     assert holds(ARDIN2016, ARDIN2016.measure(walks(model=ARDIN_MODELS, resets=resets))) == expected
+
+
+def test_an_effect_over_routes_counts_every_walk():
+    table = walks(model=["a", "b"] * 4, place=["x"] * 4 + ["y"] * 4, resets=[0, 2, 0, 4, 1, 7, np.nan, 9])
+    effect = over_routes("b minus a", table, "resets", lambda mean: mean["b"] - mean["a"])
+    assert (effect.value, effect.units, effect.of) == (pytest.approx(5.5 - 1 / 3), 2, "routes")
+    many = pd.concat(
+        [table.assign(place=f"route {k}", resets=table["resets"] + (table["model"] == "b") * k) for k in range(9)]
+    )
+    effect = over_routes("b minus a", many, "resets", lambda mean: mean["b"] - mean["a"])
+    assert effect.low < effect.value < effect.high
 
 
 def test_baddeley_by_hand():

@@ -8,10 +8,14 @@ import sys
 import time
 from pathlib import Path
 
+import matplotlib
 import pytest
 from browser import WIDTHS, in_browser
+from figure_laws import check_figure
 
 from tussock.navigation.cli.main import main
+from tussock.navigation.cli.studies import ThesisCommand
+from tussock.navigation.reports.drawing import STYLE
 from tussock.navigation.studies.thesis.figures import FIGURES
 from tussock.navigation.studies.thesis.report import ITEMS
 from tussock.navigation.studies.thesis.studies import STUDIES
@@ -98,6 +102,29 @@ def test_the_page_is_self_contained_and_has_everything(replication):
     figures = sorted(path.name for path in (replication / "figures").iterdir())
     assert len(figures) == 2 * len(FIGURES)
     assert sum(name.endswith(".svg") for name in figures) == len(FIGURES)
+
+
+@pytest.mark.slow
+def test_the_first_screen_counts_the_claims_and_a_quick_run_judges_few(replication):
+    page = (replication / "report.html").read_text(encoding="utf-8")
+    claims = json.loads((replication / "results.json").read_text())["claims"]
+    untested = [key for key, claim in claims.items() if claim["holds"] == [None]]
+    assert all(claims[key]["reason"] for key in untested)
+    assert len(untested) >= 16
+    head = page[: page.index("<dl>")]
+    assert re.search(rf"\d+ of {len(CLAIMS)} claims hold", head)
+    assert f"{len(untested)} not tested." in head
+    assert claims["visual-compass-near"]["effects"][0]["units"] == 12
+
+
+@pytest.mark.slow
+def test_every_figure_can_be_read_and_its_axes_fit_its_data(replication):
+    command = ThesisCommand(quick=True, world="tiny", size="72x15", spacing_m=0.04, out=replication)
+    runs, data = command.runs(tuple(STUDIES))
+    for item in FIGURES:
+        assert item.draw is not None
+        with matplotlib.rc_context(STYLE):
+            check_figure(item.draw(runs[0][item.study], data))
 
 
 @pytest.mark.parametrize("width", WIDTHS)

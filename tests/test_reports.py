@@ -15,10 +15,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tussock.navigation.reports.claims import Claim, Decision, Spread, check_claims
+from tussock.navigation.reports.claims import Claim, Decision, Spread, check_claims, count_outcomes
 from tussock.navigation.reports.drawing import canvas
+from tussock.navigation.reports.effects import MIN_UNITS, effect_size
 from tussock.navigation.reports.maps import draw_map, map_axes
-from tussock.navigation.reports.page import format_spread, format_value
+from tussock.navigation.reports.page import format_effects, format_spread, format_value
 from tussock.navigation.reports.report import (
     Bullets,
     Cell,
@@ -149,6 +150,79 @@ def test_rows_have_every_label_once():
     assert result.rows == [("x (deg)", 4.0, Spread(1, 1, 1)), ("y", 5.0, None)]
 
 
+def with_effect(units: int) -> Claim:
+    """A claim that holds, with the mean of `units` numbers as its effect."""
+
+    def decide(results: StudyResults) -> Decision:
+        return Decision({"x": 1.0}, True, effect_size("mean", units, lambda rows: float(rows.mean()), of="routes"))
+
+    return claim(decide=decide)
+
+
+@pytest.mark.parametrize(
+    ("results", "text"),
+    [
+        ([[1.0]] * 16 + [[0.0]] * 4 + [[math.nan]] * 2, "16 of 22 claims hold, 4 do not, 2 not tested"),
+        ([[1.0], [0.0]], "1 of 2 claims holds, 1 does not"),
+        ([[math.nan]], "none of 1 claims was tested"),
+        (
+            [[1.0, 1.0], [1.0, 0.0], [0.0, 0.0], [math.nan] * 2],
+            "1 of 4 claims holds in all 2 runs, 1 in some, 1 in none, 1 not tested",
+        ),
+    ],
+)
+def test_outcomes_are_counted(results, text):
+    assert count_outcomes([outcome(*numbers) for numbers in results]) == text
+
+
+def test_a_quick_run_judges_only_what_it_can_test():
+    runs = [StudyResults(tables={}, numbers={"x": 1.0})]
+    cannot, can = check_claims([claim(not_quick="it is too short"), claim()], runs, quick=True)
+    assert (cannot.label, cannot.style, cannot.reason) == ("not tested", "untested", "it is too short")
+    assert cannot.obtained == [{"x (deg)": 1.0}]
+    assert (can.label, can.reason) == ("holds", "")
+    (whole,) = check_claims([claim(not_quick="it is too short")], runs)
+    assert (whole.label, whole.reason) == ("holds", "")
+
+
+@pytest.mark.parametrize(("units", "label"), [(MIN_UNITS - 1, "not tested"), (MIN_UNITS, "holds")])
+def test_few_units_are_no_test_where_one_is_asked_for(units, label):
+    runs = [StudyResults(tables={}, numbers={})]
+    (result,) = check_claims([with_effect(units)], runs, few_units=False)
+    assert result.label == label
+    assert ("4 routes; the test needs 5" in result.reason) == (label == "not tested")
+    assert check_claims([with_effect(units)], runs)[0].label == "holds"
+
+
+# Effects
+
+
+def test_the_interval_of_an_effect_is_that_of_the_textbook():
+    values = np.random.default_rng(1).normal(3, 2, 400)
+    effect = effect_size("mean", 400, lambda rows: float(values[rows].mean()), of="positions")
+    assert effect.value == values.mean()
+    half = 1.96 * values.std() / 20
+    assert np.allclose([effect.low, effect.high], [effect.value - half, effect.value + half], atol=0.1 * half)
+
+
+def test_there_is_no_interval_of_few_or_equal_units():
+    for units, values in ((0, []), (4, [1.0, 2, 3, 4]), (9, [1.0] * 9)):
+        numbers = np.array(values)
+        effect = effect_size("mean", units, lambda rows, numbers=numbers: float(numbers[rows].mean()), of="routes")
+        assert np.isnan([effect.low, effect.high]).all()
+        assert np.isnan(effect.value) == (units == 0)
+
+
+@pytest.mark.parametrize(
+    ("units", "text"),
+    [(4, "mean: 1.5 (4 routes: no interval)"), (9, "mean: 4 (2.33 to 5.56; 9 routes)")],
+)
+def test_effects_as_text(units, text):
+    (result,) = check_claims([with_effect(units)], [StudyResults(tables={}, numbers={})])
+    assert format_effects(result) == text
+    assert result.evidence["effects"][0]["units"] == units
+
+
 # Pages
 
 
@@ -227,6 +301,12 @@ def test_a_report_has_figures_json_and_one_page(tmp_path):
         assert text in page
     for anchor in ("summary", "part", "fig", "text", "claim-large"):
         assert page.count(f'id="{anchor}"') == 1
+
+
+def test_the_main_result_is_on_the_first_screen(tmp_path):
+    write_report(report(draw_two, headline="15 of 30 arrived."), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.index("<h1>") < page.index("15 of 30 arrived.") < page.index("<dl>")
 
 
 def test_the_same_report_has_the_same_bytes(tmp_path):

@@ -3,9 +3,11 @@
 import dataclasses
 import logging
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+from figure_laws import check_figure
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -14,11 +16,15 @@ from sklearn.model_selection import ParameterGrid
 
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import make_model
+from tussock.navigation.reports.claims import Outcome, check_claims
+from tussock.navigation.reports.drawing import STYLE
 from tussock.navigation.reports.results import StudyResults
 from tussock.navigation.studies.thesis import published
 from tussock.navigation.studies.thesis.classifier import FIRST, held_out_views
 from tussock.navigation.studies.thesis.confidence import random_errors
 from tussock.navigation.studies.thesis.corners import corner_section, corner_views, equally_different, turning
+from tussock.navigation.studies.thesis.effects import difference_of_medians, fall_of_median, median_error
+from tussock.navigation.studies.thesis.figures import FIGURES
 from tussock.navigation.studies.thesis.grid_search import share_of
 from tussock.navigation.studies.thesis.headings import box_of, errors_of, headings
 from tussock.navigation.studies.thesis.parameters import StudySettings
@@ -312,3 +318,75 @@ def test_errors_of_the_visual_compass_follow_from_its_headings(data, tmp_path):
     assert around["distance_m"].max() <= 0.5
     off = np.abs(wrap_angle(np.radians(around["heading_deg"] - around["set_heading_deg"])))
     assert np.allclose(np.degrees(off), around["error_deg"])
+
+
+def test_every_text_of_the_figures_can_be_read_and_their_axes_fit_their_data(data, tmp_path):
+    results = run_studies(data, StudySettings(quick=True), tmp_path, FAST)
+    for item in FIGURES:
+        if item.study in FAST:
+            assert item.draw is not None
+            with matplotlib.rc_context(STYLE):
+                check_figure(item.draw(results[item.study], data))
+
+
+# Claims about networks
+
+
+def trained(short: float, long: float, narrow: float) -> StudyResults:
+    """Results of the study of confidence: median errors (degrees) after a short and a long training, and with narrow scans."""
+    medians = {(600, 360): short, (3000, 360): long, (3000, 180): (long + narrow) / 2, (3000, 90): narrow}
+    rows = [
+        {
+            "iterations": n,
+            "scan_deg": scan,
+            "seed": seed,
+            "median_error_deg": median,
+            "high_share": n / 6000,
+            "reversed_share": 0.5,
+        }
+        for (n, scan), median in medians.items()
+        for seed in range(3)
+    ]
+    spread = np.linspace(-10, 10, 21)
+    tables = {
+        f"headings_{name}": pd.DataFrame({"error_deg": median + spread})
+        for name, median in (("short", short), ("long", long), ("scan_90", narrow))
+    }
+    chance = pd.DataFrame({"scan_deg": [360, 180, 90], "median_error_deg": [90.0, 45, 22.5]})
+    tables |= {"networks": pd.DataFrame(rows), "chance": chance}
+    return StudyResults(tables=tables, numbers={"iterations": [600, 3000]})
+
+
+def outcomes_of_training(results: StudyResults, *, quick: bool = False) -> dict[str, Outcome]:
+    outcomes = check_claims(STUDIES["confidence"].claims, [results], quick=quick)
+    return {each.claim.key: each for each in outcomes}
+
+
+def test_a_network_that_is_worse_than_chance_supports_no_claim():
+    """Errors that fall from 135 to 130 degrees, and with narrower scans to 60, are worse than those of random headings."""
+    chance = outcomes_of_training(trained(135, 130, 60))
+    better = outcomes_of_training(trained(110, 40, 10))
+    for key in ("longer-training-helps", "longer-training-broadens", "narrower-scans-help"):
+        assert chance[key].label == "does not hold", key
+        assert better[key].label == "holds", key
+    assert outcomes_of_training(trained(110, 40, 39))["narrower-scans-help"].label == "does not hold"
+
+
+def test_a_quick_study_judges_no_network():
+    quick = outcomes_of_training(trained(110, 40, 10), quick=True)
+    assert {each.label for each in quick.values()} == {"not tested"}
+    assert all("--quick" in each.reason for each in quick.values())
+    networks = {claim.key for name in ("classifier", "confidence", "beyond") for claim in STUDIES[name].claims}
+    judged = {claim.key for study in STUDIES.values() for claim in study.claims if not claim.not_quick}
+    assert not networks & judged
+    assert "idf-minimum" in judged
+
+
+def test_effects_of_medians_by_hand():
+    table, other = (pd.DataFrame({"error_deg": np.arange(9.0) + shift}) for shift in (0, 5))
+    assert median_error("", table).value == 4
+    fall = fall_of_median("", other, table)
+    assert (fall.value, fall.units, fall.of) == (5, 9, "positions")
+    apart = difference_of_medians("", table, np.arange(9) > 5)
+    assert apart.value == 7 - 2.5
+    assert apart.low < apart.value < apart.high

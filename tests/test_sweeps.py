@@ -35,7 +35,7 @@ from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.reports.report import Drawing
-from tussock.navigation.sweeps.report import write_sweep_report
+from tussock.navigation.sweeps.report import arrivals, write_sweep_report
 from tussock.navigation.sweeps.spec import Sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
 from tussock.navigation.sweeps.sweep import MAX_TOGETHER, finished_run, record_again, run_sweep, side_by_side
@@ -731,6 +731,33 @@ def test_the_report_of_a_sweep_stands_by_itself(swept, reported):
     assert all(row["command"] in html for row in table(swept).to_dict("records") if row["key"] in results["worst"])
     anchors = ["by-model", "by-offset_m", "by-seed", "pairs", "causes", "worst"]
     assert all(f'id="{anchor}"' in html for anchor in [*anchors, *(f"walk-{key}" for key in results["worst"])])
+
+
+def test_the_title_of_a_sweep_is_that_of_its_page(tmp_path):
+    path = written(tmp_path, 'title = "Who arrives?"\n' + SWEEP)
+    fill(path, tmp_path / "out", 24)
+    run_sweep(read_sweep(path), tmp_path / "out")  # of which nothing is missing
+    write_sweep_report(tmp_path / "out", worst=0)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<title>Who arrives?</title>" in page
+    (tmp_path / "out" / "sweep.json").write_text("damaged")
+    write_sweep_report(tmp_path / "out", worst=0)
+    assert "<h1>Sweep out</h1>" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_first_screen_of_a_sweep_counts_arrivals(swept, reported):
+    page, runs = Path(reported["report"]).read_text(encoding="utf-8"), table(swept)
+    counts = [int(runs.loc[runs["model"] == model, "arrived"].sum()) for model in ("infomax", "perfect-memory")]
+    head = f"{sum(counts)} of 24 arrived: infomax {counts[0]} of 12, perfect-memory {counts[1]} of 12."
+    assert page.index(head) < page.index("<dl>")
+
+
+def test_arrivals_tell_choices_apart():
+    runs = pd.DataFrame({"model": ["rbm units=2", "rbm units=2", "chain"], "arrived": [True, False, True], "one": 1})
+    assert arrivals(runs, ["model"]) == "2 of 3 arrived: rbm 1 of 2, chain 1 of 1"
+    alike = runs.assign(model=["rbm units=2", "rbm units=2", "rbm units=3"])
+    assert arrivals(alike, ["model"]) == "2 of 3 arrived: rbm units=2 1 of 2, rbm units=3 1 of 1"
+    assert arrivals(runs, []) == arrivals(runs, ["one"]) == "2 of 3 arrived"
 
 
 def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):

@@ -49,7 +49,9 @@ class StudyOptions(RouteOptions):
         items_of(names, only)
         check_report_folder(self.out, about, overwrite=self.overwrite)
         runs, data = self.runs(names)
-        outcomes = write_thesis_report(self.out, runs, data, about=about, command=self.command, title=title, only=only)
+        outcomes = write_thesis_report(
+            self.out, runs, data, about=about, command=self.command, title=title, only=only, quick=self.quick
+        )
         claims = [each for outcomes_of_study in outcomes.values() for each in outcomes_of_study]
         return {
             "report": str(self.out / REPORT),

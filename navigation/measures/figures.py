@@ -36,7 +36,7 @@ def difference_figure(rotations: Sequence[Rotational], translations: Mapping[str
     right.set(xlabel="m from the reference, at its heading")
     left.set_ylim(bottom=0)
     for each in (left, right):
-        each.legend(frameon=False, fontsize=8)
+        each.legend(frameon=False, fontsize="small")
     return figure
 
 
@@ -55,7 +55,7 @@ def catchment_figure(ground: Landscape, found: Catchment, around: Route | Pose, 
         left.add_collection(cells)
         if alpha == 1.0:
             figure.colorbar(cells, ax=left, label="image difference", shrink=0.8)
-    left.set_title(f"catchment (full colour): {found.area:.3g} m²", fontsize=9)
+    left.set_title(f"catchment (full colour): {found.area:.3g} m²")
     draw_map(right, world, xy, half)
     error = np.degrees(ground.errors)
     for part, colour in (
@@ -67,7 +67,7 @@ def catchment_figure(ground: Landscape, found: Catchment, around: Route | Pose, 
         if len(shown):
             x, y = xy[shown].T
             draw_arrows(right, x, y, np.degrees(ground.headings[shown]), colour, 0.8 * ground.spacing)
-    right.set_title("recovered headings: off by up to\n45 (green), 90 (orange), 180 degrees", fontsize=9)
+    right.set_title("recovered headings: off by up to\n45 (green), 90 (orange), 180 degrees")
     for each in (left, right):
         if isinstance(around, Route):
             draw_route(each, around)
@@ -84,11 +84,11 @@ def place_figure(found: PlaceRecognition, tolerance: float) -> Figure:
         np.r_[0, found.recall], np.r_[found.precision[0], found.precision], where="pre", color=ROUTE_COLOUR, lw=1.5
     )
     left.set(xlim=(0, 1), ylim=(0, 1.03), xlabel="recall", ylabel="precision")
-    left.set_title(f"area {found.area:.3f}", fontsize=9)
+    left.set_title(f"area {found.area:.3f}")
     distance = np.sort(found.distance)
     right.step(distance, np.arange(1, len(distance) + 1) / len(distance), where="post", color=ROUTE_COLOUR, lw=1.5)
     right.axvline(tolerance, color=PATH_COLOUR, lw=1, label="tolerance")
     right.set(ylim=(0, 1.03), xlabel="m from the query to its best match", ylabel="share of queries")
     right.set_xlim(left=0)
-    right.legend(frameon=False, fontsize=8)
+    right.legend(frameon=False, fontsize="small")
     return figure

@@ -15,10 +15,18 @@ from PIL import Image as PillowImage
 
 from tussock.world.atomic import replacing
 
-STYLE: Any = {"font.family": "DejaVu Sans", "font.size": 9, "svg.hashsalt": "tussock"}  # the same bytes each time
+from .layout import fit_texts
+
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.5,  # of which a telephone shows half
+    "axes.titlesize": "medium",
+    "svg.hashsalt": "tussock",  # the same bytes each time
+}
 ROUTE_COLOUR, PATH_COLOUR, CURVE_COLOUR = "#2f6bff", "#e6352b", "#333333"
 GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
 WIDE, TALL = (7.2, 2.9), (7.2, 5.6)  # inches
+HANDLE, CHARACTER = 0.5, 0.08  # inches that a line and a letter take in a legend
 DPI = 130
 
 
@@ -39,6 +47,7 @@ class Image:
 
 def save_figure(figure: Figure, folder: Path, name: str) -> Image:
     """Write a figure as NAME.png and NAME.svg into a folder; give the PNG for a page."""
+    fit_texts(figure)
     png = io.BytesIO()
     figure.savefig(png, dpi=DPI, format="png")
     with replacing(folder / f"{name}.png") as partial:
@@ -51,6 +60,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> Image:
 
 def save_picture(figure: Figure, path: str | os.PathLike) -> None:
     """Write a figure as one file, .png or .svg."""
+    fit_texts(figure)
     with replacing(path) as partial:
         figure.savefig(partial, dpi=120, format=Path(path).suffix.lstrip(".").lower())
 
@@ -72,6 +82,35 @@ def empty_figure(reason: str) -> Figure:
     return figure
 
 
+def legend_above(axes: Axes) -> None:
+    """Explain what is drawn above the figure, where it covers no data, in as many columns as fit."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure = axes.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    column = HANDLE + CHARACTER * max(map(len, labels))
+    columns = max(1, int(figure.get_figwidth() / column))
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns, frameon=False, fontsize="small")
+
+
+def from_zero(axes: Axes) -> None:
+    """Let a vertical axis begin at zero and end above all data, also those of axes that share it and those drawn later.
+
+    `set_ylim(bottom=0)` would fix its end as well, at the data drawn so far.
+    """
+    axes.axhline(0, lw=0).sticky_edges.y.append(0)
+    axes.autoscale_view(scalex=False)
+    if (
+        axes.get_ylim()[0] < 0 == axes.dataLim.y0 == axes.dataLim.y1
+    ):  # everything is zero: matplotlib puts that in the middle
+        axes.set_ylim(0, 1, auto=True)
+
+
+def label_errors(axes: Axes, label: str = "error (degrees)") -> None:
+    """Make a vertical axis one of errors, from zero."""
+    axes.set_ylabel(label)
+    from_zero(axes)
+
+
 def draw_over_circle(
     axes: Axes, degrees, values, label: str | None = None, colour: str = CURVE_COLOUR, **style
 ) -> None:
@@ -82,13 +121,11 @@ def draw_over_circle(
 
 
 def draw_lines(axes: Axes, x, curves: Mapping[str, tuple], ylabel: str = "error (degrees)") -> None:
-    """Draw several lines over one axis. curves: values, colour and style, by label."""
+    """Draw several lines of errors over one axis. curves: values, colour and style, by label."""
     for label, (values, colour, style) in curves.items():
         axes.plot(x, values, style, color=colour, label=label, ms=4, lw=1.5)
-    axes.set_ylabel(ylabel)
-    axes.set_ylim(bottom=0)
+    label_errors(axes, ylabel)
     axes.grid(axis="y", color="#00000018")
-    axes.legend(frameon=False, fontsize=8)
 
 
 def draw_panorama(axes: Axes, view: np.ndarray, title: str = "") -> None:
@@ -96,4 +133,4 @@ def draw_panorama(axes: Axes, view: np.ndarray, title: str = "") -> None:
     image = view[..., :3] if view.ndim == 3 else view
     axes.imshow(image, extent=(180, -180, 0, 75), cmap="gray", aspect="auto", interpolation="nearest")
     axes.set(xticks=range(-180, 181, 90), xlim=(180, -180), yticks=[], xlabel="degrees left of straight ahead")
-    axes.set_title(title, fontsize=9)
+    axes.set_title(title)

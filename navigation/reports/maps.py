@@ -78,7 +78,7 @@ def map_axes(
     across, up = np.ptp(xy, axis=0) + 2 * MARGIN
     scale = min((MAX_WIDTH - 0.7) / columns / across, max_height / up)
     width = max(2.4 * columns, scale * across * columns + 0.7 + 0.15 * columns)  # titles need room
-    return canvas((width, scale * up + 0.9), 1, columns, sharey=True)
+    return canvas((width, scale * up + 1.1), 1, columns, sharey=True)  # two lines of title, ticks and labels
 
 
 def draw_map(

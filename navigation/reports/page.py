@@ -5,7 +5,8 @@ from typing import Any
 
 import jinja2
 
-from .claims import Spread
+from .claims import Outcome, Spread
+from .effects import MIN_UNITS, Effect
 
 
 def render_page(report: Any, images: Mapping[Any, Any]) -> str:
@@ -25,7 +26,12 @@ def render_page(report: Any, images: Mapping[Any, Any]) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {"value": format_value, "spread": format_spread, "label": format_label}
+    environment.filters |= {
+        "value": format_value,
+        "spread": format_spread,
+        "label": format_label,
+        "effects": format_effects,
+    }
     return environment.get_template("page.html").render(report=report, images=images)
 
 
@@ -52,3 +58,17 @@ def format_spread(spread: Spread | None) -> str:
 def format_label(label: str) -> str:
     """The label of a number as text."""
     return label.replace("(deg)", "(°)")
+
+
+def format_effects(outcome: Outcome) -> str:
+    """The sizes of an effect in all runs as text, with their intervals and the number of units."""
+    effects = outcome.known_effects
+    return f"{format_label(effects[0].label)}: {'; '.join(map(_format_effect, effects))}" if effects else ""
+
+
+def _format_effect(effect: Effect) -> str:
+    units = f"{effect.units:,} {effect.of if effect.units != 1 else effect.of.removesuffix('s')}"
+    if effect.low != effect.low:
+        alike = "all alike, " if effect.units >= MIN_UNITS else ""
+        return f"{format_value(effect.value)} ({units}: {alike}no interval)"
+    return f"{format_value(effect.value)} ({format_value(effect.low)} to {format_value(effect.high)}; {units})"

@@ -162,6 +162,7 @@ class Report:
         footer: Text at the end of the page.
         results: Everything in numbers, for the JSON file.
         results_file: Name of the JSON file.
+        headline: The main result in a sentence, above everything else; empty for none.
     """
 
     title: str
@@ -171,6 +172,7 @@ class Report:
     footer: str
     results: dict[str, Any]
     results_file: str = field(default=RESULTS)
+    headline: str = ""
 
 
 def write_report(report: Report, folder: Path, progress: Progress = no_progress) -> dict[str, Any]:

@@ -9,13 +9,24 @@ from matplotlib.figure import Figure
 from tussock.world.geometry import Route
 from tussock.world.scene import World
 
-from ..reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, canvas, draw_panorama
+from ..reports.drawing import (
+    CURVE_COLOUR,
+    GOOD_COLOUR,
+    PATH_COLOUR,
+    ROUTE_COLOUR,
+    SOFT_COLOUR,
+    canvas,
+    draw_panorama,
+    from_zero,
+    legend_above,
+)
 from ..reports.maps import draw_map, draw_route, map_axes
 from .statistics import MEASURES, Interval, axis_label, by_axis, choice_label
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)
 MAX_LABELS = 24  # an axis with more choices has no labels
-MAX_LABEL_LENGTH = 25
+MAX_TICKS = 11  # of numbers, in steps
+MAX_LABEL_LENGTH = 40
 
 
 def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: list[str]) -> Figure:
@@ -53,13 +64,15 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
             colour = COLOURS[number % len(COLOURS)]
             _draw_intervals(panel, positions[known] + shift, values, fmt=style, color=colour, label=label)
     for measure, panel in panels.items():
-        panel.set_ylabel(MEASURES[measure].replace(" (", "\n("))
+        panel.set_ylabel(MEASURES[measure])
         panel.grid(axis="y", color="#00000018")
-        panel.set_ylim(bottom=0, top=1.05 if measure == "arrived" else None)
+        if measure == "arrived":
+            panel.set_ylim(-0.05, 1.05)
+        else:
+            from_zero(panel)
     _label_axis(axes[-1, 0], axis, positions, None if numeric else labels)
     if by:
-        handles = axes[0, 0].get_legend_handles_labels()
-        figure.legend(*handles, loc="outside upper left", ncols=4, frameon=False, fontsize=8)
+        legend_above(axes[0, 0])
     return figure
 
 
@@ -74,10 +87,11 @@ def _label_axis(axes: Axes, axis: list[str], positions: np.ndarray, labels: list
     """Label a horizontal axis of numbers, or of choices with labels."""
     axes.set_xlabel(axis_label(axis))
     if labels is None:
-        axes.set_xticks(positions if len(positions) <= 12 else positions[:: len(positions) // 10])
+        if np.ptp(positions) <= MAX_TICKS * np.diff(positions).min(initial=np.inf):  # each has room for its number
+            axes.set_xticks(positions)
     elif len(labels) <= MAX_LABELS:
         short = [name if len(name) <= MAX_LABEL_LENGTH else f"{name[: MAX_LABEL_LENGTH - 1]}…" for name in labels]
-        axes.set_xticks(positions, short, rotation=20 if len(labels) > 4 else 0)
+        axes.set_xticks(positions, short)
 
 
 def walk_map(world: World, route: Route, steps: pd.DataFrame, shown: int) -> Figure:

@@ -28,12 +28,13 @@ from .statistics import (
     ranges_of,
     setting_label,
 )
-from .store import TABLE, Store, read_steps
+from .store import TABLE, Store, read_steps, read_title
 from .sweep import worst_of
 from .worst import walk_section
 
 RESULTS = "report.json"
 MAX_ERRORS = 100  # on the page
+MAX_IN_HEADLINE = 8  # choices
 LEAD = "Success and errors of all runs, and why the worst of them failed."
 INTERVALS = (
     "Numbers in parentheses are 95 % bootstrap confidence intervals of the mean. Runs in one world are not independent, so whole worlds "
@@ -86,13 +87,14 @@ def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_
     measures = [name for name in MEASURES if name != "resets" or completed["resets"].to_numpy().any()]
     results = plain_json(_results(table, completed, axes, measures, shown))
     report = Report(
-        title=f"Sweep {folder.resolve().name}",
+        title=read_title(folder) or f"Sweep {folder.resolve().name}",
         lead=LEAD,
         about=_about(table, completed, axes),
         blocks=_blocks(completed, axes, measures, results, walks),
         footer=FOOTER,
         results=results,
         results_file=RESULTS,
+        headline=f"{arrivals(completed, _compared(completed, axes))}.",
     )
     return write_report(report, folder, progress)
 
@@ -145,6 +147,30 @@ def _compared(completed: pd.DataFrame, axes: dict[str, list[str]]) -> list[str]:
     return next((names for wanted in ("model", "encoding") for names in few if wanted in names), [])
 
 
+def arrivals(completed: pd.DataFrame, by: list[str]) -> str:
+    """How many runs arrived, as in "15 of 30 arrived: perfect-memory 15 of 15, random 0 of 15".
+
+    Args:
+        completed: The runs.
+        by: Settings whose choices are told apart, unless there are too many of them; empty for none. Their parameters are left out where
+            the names alone differ.
+
+    Returns:
+        The sentence, without its full stop.
+    """
+    count = _arrived(completed)
+    groups = {choice_label(key): part for key, part in completed.groupby(by, dropna=False, sort=False)} if by else {}
+    if not 1 < len(groups) <= MAX_IN_HEADLINE:
+        return f"{count} arrived"
+    short = {label: label.split()[0] for label in groups}
+    names = short if len(set(short.values())) == len(short) else dict(zip(short, short, strict=True))
+    return f"{count} arrived: {', '.join(f'{names[label]} {_arrived(part)}' for label, part in groups.items())}"
+
+
+def _arrived(runs: pd.DataFrame) -> str:
+    return f"{int(runs['arrived'].sum())} of {len(runs)}"
+
+
 def _numbers(intervals: dict[str, Interval]) -> dict[str, Any]:
     return {measure: dataclasses.asdict(interval) for measure, interval in intervals.items()}
 
@@ -162,7 +188,7 @@ def _about(table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[st
     choices = [f"{label}: {completed.groupby(names, dropna=False).ngroups}" for label, names in axes.items()]
     count = "all" if len(completed) == len(table) else str(len(completed))
     return {
-        "Runs": f"{len(table)} runs, {count} completed, {int(completed['arrived'].sum())} arrived",
+        "Runs": f"{len(table)} runs, {count} completed",
         "Varied": "; ".join(choices) or "nothing",
         "Equal in all runs": "; ".join(equal) or "everything has its default",
     }

@@ -18,7 +18,7 @@ from filelock import FileLock, Timeout
 from tussock.world.atomic import replacing
 from tussock.world.errors import DiskFullError, FileError
 
-FINISHED, TABLE, LOCK = "finished.sqlite", "runs.parquet", ".lock"
+FINISHED, TABLE, ABOUT, LOCK = "finished.sqlite", "runs.parquet", "sweep.json", ".lock"
 _TABLES = """
     BEGIN;
     CREATE TABLE runs (
@@ -210,3 +210,18 @@ def write_table(table: pd.DataFrame, folder: Path) -> Path:
     with replacing(path) as partial:
         partial.write_bytes(table.to_parquet(index=False))
     return path
+
+
+def write_title(title: str, folder: Path) -> None:
+    """Keep the title of a sweep for its report."""
+    with replacing(folder / ABOUT) as partial:
+        partial.write_text(json.dumps({"title": title}) + "\n", encoding="utf-8")
+
+
+def read_title(folder: Path) -> str | None:
+    """The title of a sweep; None where its folder has none, as those of older versions."""
+    try:
+        title = json.loads((folder / ABOUT).read_text(encoding="utf-8"))["title"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return title if isinstance(title, str) else None

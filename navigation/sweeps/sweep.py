@@ -28,7 +28,7 @@ from ..experiment_settings import TYPES, run_command, settings_of
 from ..recording.run_folder import record_run
 from . import work
 from .spec import Sweep
-from .store import TABLE, Finished, Store, write_table
+from .store import TABLE, Finished, Store, write_table, write_title
 from .work import Walked, draw, learn, walk
 from .workers import METHOD, WORK, prepare_workers
 
@@ -71,6 +71,7 @@ def run_sweep(
     runs = _by_key(sweep)
     with Store(out) as store:
         store.check_settings(TYPES)
+        write_title(sweep.title, out)
         finished = store.finished()
         missing = {key: run for key, run in runs.items() if key not in finished}
         progress(len(runs) - len(missing), len(runs))

@@ -10,6 +10,7 @@ from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
+from .effects import over_routes
 from .figures import boxes, lines_by_model
 from .protocol import Item, Parameter, Protocol, models_in
 
@@ -63,7 +64,13 @@ def _random_worst(results: StudyResults) -> Decision:
     """All three memories make fewer errors than a random choice of direction."""
     obtained = _errors(results, PERFECT, BODY, INFOMAX, RANDOM)
     *others, random = obtained.values()
-    return Decision(obtained, max(others) < random)
+    effect = over_routes(
+        "random's errors minus those of the worst other",
+        results.tables["walks"],
+        "errors",
+        lambda mean: mean[RANDOM] - mean.drop(RANDOM).max(),
+    )
+    return Decision(obtained, max(others) < random, effect)
 
 
 @claim("perfect-best", "by-model", "no other model makes fewer errors per walk", note=NOTE)
@@ -71,7 +78,13 @@ def _perfect_best(results: StudyResults) -> Decision:
     """Perfect memory, which stores every view, makes the fewest errors."""
     obtained = _errors(results, PERFECT, BODY, INFOMAX)
     perfect, *others = (*obtained.values(), results.numbers[f"errors, {RANDOM}"])
-    return Decision(obtained, perfect <= min(others))
+    effect = over_routes(
+        "errors of the best other minus perfect memory's",
+        results.tables["walks"],
+        "errors",
+        lambda mean: mean.drop(PERFECT).min() - mean[PERFECT],
+    )
+    return Decision(obtained, perfect <= min(others), effect)
 
 
 @claim(
@@ -84,7 +97,13 @@ def _body_close(results: StudyResults) -> Decision:
     """The mushroom body follows routes nearly as well as perfect memory."""
     perfect, body, random = _errors(results, PERFECT, BODY, RANDOM).values()
     share = (body - perfect) / (random - perfect) if random != perfect else float("nan")
-    return Decision({"share of the way from perfect memory to random": share}, share <= 0.1)
+    effect = over_routes(
+        "mushroom body's errors minus perfect memory's",
+        results.tables["walks"],
+        "errors",
+        lambda mean: mean[BODY] - mean[PERFECT],
+    )
+    return Decision({"share of the way from perfect memory to random": share}, share <= 0.1, effect)
 
 
 CLAIMS = (_random_worst, _perfect_best, _body_close)

@@ -13,6 +13,7 @@ from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
+from .effects import over_routes
 from .figures import lines_by_model
 from .protocol import Item, Parameter, Protocol
 
@@ -71,7 +72,16 @@ def _no_approach(results: StudyResults) -> Decision:
     ranks = results.tables["by_start"][["start beside the route (m)", "mean displacement (m)"]].rank()
     rank = float(ranks.corr().iloc[0, 1]) if len(ranks) > 1 else np.nan
     obtained = {"rank correlation of displacement and that of the start": rank} | results.numbers
-    return Decision(obtained, None if np.isnan(rank) else rank >= MIN_RANK)
+    if np.isnan(rank):
+        return Decision(obtained, None, reason="all walks start at the same distance from the route")
+    effect = over_routes("rank correlation", results.tables["walks"], "displacement_m", _rank_correlation, by="start_m")
+    return Decision(obtained, rank >= MIN_RANK, effect)
+
+
+def _rank_correlation(means: pd.Series) -> float:
+    """The rank correlation of means with what they are told apart by."""
+    known = means.dropna()
+    return float(known.rank().corr(pd.Series(known.index, index=known.index).rank())) if len(known) > 1 else np.nan
 
 
 def _starts(count: int) -> list[float]:

@@ -12,6 +12,7 @@ from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
+from .effects import over_routes
 from .figures import boxes, boxes_by_model
 from .protocol import Item, Parameter, Protocol
 
@@ -50,7 +51,10 @@ def measure(walks: pd.DataFrame) -> StudyResults:
 
 def _follows(results: StudyResults, model: str) -> Decision:
     share = float(results.numbers[f"arrived without an error, {model}"])
-    return Decision({"walks that arrive without an error": share}, share >= MOSTLY)
+    effect = over_routes(
+        "walks that arrive without an error", results.tables["walks"], "flawless", lambda mean: mean[model]
+    )
+    return Decision({"walks that arrive without an error": share}, share >= MOSTLY, effect)
 
 
 @claim(
@@ -63,7 +67,13 @@ def _better_than_chance(results: StudyResults) -> Decision:
     """The network has learned the route: it does much better than chance."""
     infomax, random = (float(results.numbers[f"errors a walk, {model}"]) for model in (INFOMAX, RANDOM))
     obtained = {f"errors a walk, {INFOMAX}": infomax, f"errors a walk, {RANDOM}": random}
-    return Decision(obtained, infomax < random / 2)
+    effect = over_routes(
+        "random's errors minus Infomax's",
+        results.tables["walks"],
+        "errors",
+        lambda mean: mean[RANDOM] - mean[INFOMAX],
+    )
+    return Decision(obtained, infomax < random / 2, effect)
 
 
 @claim("perfect-memory-follows", "by-model", FOLLOWS, note=NOTE)

@@ -1,14 +1,25 @@
 """Figures of tables of walks, one line or box per model."""
 
+from itertools import cycle
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ...reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, canvas
+from ...reports.drawing import (
+    CURVE_COLOUR,
+    GOOD_COLOUR,
+    PATH_COLOUR,
+    ROUTE_COLOUR,
+    SOFT_COLOUR,
+    canvas,
+    from_zero,
+    legend_above,
+)
 from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
-MARKERS = "osD^v"
+MARKERS = "osD^vPX"  # seven, so that 35 models look different in five colours
 
 
 def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str, *, diagonal: bool = False) -> Figure:
@@ -27,7 +38,7 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
     """
     figure, axes = canvas((7.2, 3.4))
     axis = axes[0, 0]
-    for model, colour, marker in zip(models_in(walks), COLOURS, MARKERS, strict=False):
+    for model, colour, marker in zip(models_in(walks), cycle(COLOURS), cycle(MARKERS), strict=False):
         grouped = walks[walks["model"] == model].groupby(x)[y]
         mean, error = grouped.mean().astype(float), grouped.sem().fillna(0).astype(float)
         style = {"fmt": f"-{marker}", "color": colour, "label": model}
@@ -36,9 +47,9 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
         ends = np.array([0.0, walks[x].max()])
         axis.plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")
     axis.set(xlabel=xlabel, ylabel=ylabel)
-    axis.set_ylim(bottom=0)
+    from_zero(axis)
     axis.grid(axis="y", color="#00000018")
-    axis.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(axis)
     return figure
 
 
@@ -60,7 +71,7 @@ def boxes_by_model(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
         box.set(facecolor=colour + "33", edgecolor=colour)
         middle.set_color(colour)
     axis.set_ylabel(ylabel)
-    axis.set_ylim(bottom=0)
+    from_zero(axis)
     axis.grid(axis="y", color="#00000018")
     return figure
 

@@ -10,6 +10,7 @@ from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
+from .effects import over_routes
 from .figures import boxes
 from .protocol import Item, Parameter, Protocol
 
@@ -45,10 +46,14 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     )
 
 
-def _chain_lower(results: StudyResults, number: str, label: str) -> Decision:
+def _chain_lower(results: StudyResults, number: str, label: str, column: str) -> Decision:
     """Whether a number is lower for the chain than for perfect memory."""
     perfect, chain = (float(results.numbers[f"{number}, {model}"]) for model in (PERFECT, CHAIN))
-    return Decision({f"{label}, {PERFECT}": perfect, f"{label}, {CHAIN}": chain}, chain < perfect)
+    obtained = {f"{label}, {PERFECT}": perfect, f"{label}, {CHAIN}": chain}
+    effect = over_routes(
+        f"{label}, {PERFECT} minus {CHAIN}", results.tables["walks"], column, lambda mean: mean[PERFECT] - mean[CHAIN]
+    )
+    return Decision(obtained, chain < perfect, effect)
 
 
 @claim(
@@ -59,13 +64,13 @@ def _chain_lower(results: StudyResults, number: str, label: str) -> Decision:
 )
 def _sequence_lowers_error(results: StudyResults) -> Decision:
     """Headings are more accurate when the view is compared only with views that are near in the sequence."""
-    return _chain_lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)")
+    return _chain_lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)", "mean_error_deg")
 
 
 @claim("sequence-fails-less", "by-model", "the chain has fewer failures per route than perfect memory", note=NOTE)
 def _sequence_fails_less(results: StudyResults) -> Decision:
     """There are fewer failures."""
-    return _chain_lower(results, FAIL_COUNT, "failures a route")
+    return _chain_lower(results, FAIL_COUNT, "failures a route", "failures")
 
 
 CLAIMS = (_sequence_lowers_error, _sequence_fails_less)

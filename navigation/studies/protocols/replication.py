@@ -10,7 +10,7 @@ from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 
 from ...experiment_keys import key_of
-from ...reports.claims import Outcome, check_claims
+from ...reports.claims import Outcome, check_claims, count_outcomes
 from ...reports.report import (
     REPORT,
     RESULTS,
@@ -26,6 +26,7 @@ from ...reports.report import (
     write_report,
 )
 from ...reports.results import StudyResults
+from ...sweeps.report import arrivals
 from ...sweeps.spec import Sweep
 from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
@@ -68,8 +69,11 @@ def replicate(
     done = run_sweep(sweep, out, workers=workers, progress=progress)
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
-    outcomes = check_claims(protocol.claims, [results])
-    write_report(_report(protocol, results, outcomes, about=about, left_out=left_out, command=command), out)
+    outcomes = check_claims(protocol.claims, [results], few_units=False)
+    parts = [*[count_outcomes(outcomes)] * bool(outcomes), arrivals(walks, ["model"])]
+    headline = "; ".join(parts) + "."
+    report = _report(protocol, results, outcomes, about=about, left_out=left_out, command=command, headline=headline)
+    write_report(report, out)
     return {
         "report": str(out / REPORT),
         "results": str(out / RESULTS),
@@ -127,6 +131,7 @@ def _report(
     about: dict[str, Any],
     left_out: dict[str, int],
     command: str,
+    headline: str,
 ) -> Report:
     links = {each.claim.key: (each.claim.figure, each.claim.figure.replace("-", " ")) for each in outcomes}
     summary = [Text(SUMMARY), ClaimTable(outcomes=outcomes, links=links)]
@@ -155,6 +160,7 @@ def _report(
         ],
         footer=f"After {protocol.paper} All numbers are in results.json, every walk is in runs.parquet.",
         results=_results(protocol, results, outcomes, about=about, left_out=left_out),
+        headline=headline,
     )
 
 
@@ -185,7 +191,7 @@ def _results(
         "could_not_run": left_out,
         "numbers": results.numbers,
         "claims": {
-            each.claim.key: each.description | {"obtained": each.obtained[0], "holds": each.holds[0]}
+            each.claim.key: each.description | {"obtained": each.obtained[0], "holds": each.holds[0]} | each.evidence
             for each in outcomes
         },
         "tables": results.to_json()["tables"],

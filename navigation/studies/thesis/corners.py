@@ -14,18 +14,21 @@ from ...encoding import Encoding
 from ...evaluation import RECOVERED_DEG
 from ...failures import CHORD
 from ...reports.claims import Decision, claim
+from ...reports.effects import effect_size
 from ...reports.results import StudyResults
 from . import published
 from .classifier import TrainedNetworks, learned_views, train_networks
+from .effects import difference_of_medians
 from .grid_search import best_tuning, search
-from .headings import median_of_medians
-from .parameters import EVERY, Progress, StudySettings
+from .headings import CHANCE_MEDIAN_DEG, CHANCE_RECOVERED, median_of_medians
+from .parameters import EVERY, QUICK_NETWORKS, Progress, StudySettings
 from .study_data import StudyData
 
 SHARE = 0.2  # at most this share of the route is corners: the part that turns the most ..
 MIN_TURNING = math.radians(10)  # .. where it turns at least this much
 MARGIN = 0.4  # m of route on both sides of the corners in the section
 RAW = Encoding.parse("grey")
+NO_CORNERS = "the route has no corners"
 EVERY_6TH, MORE_IN_CORNERS = "every 6th view", "twice as many in corners"
 
 
@@ -172,35 +175,62 @@ def _views_differ(results: StudyResults) -> Decision:
         "on straights": straight,
         "rank correlation with turning": float(rank.statistic),
     }
-    holds = bool(corner > straight and rank.statistic > 0 and rank.pvalue < 0.05)
-    return Decision(obtained, None if math.isnan(corner) else holds)
+    if math.isnan(corner):
+        return Decision(obtained, None, reason=NO_CORNERS)
+    pairs = change[["turning_deg", "rms"]].to_numpy()
+    effect = effect_size(
+        "rank correlation", len(pairs), lambda rows: float(spearmanr(pairs[rows]).statistic), of="pairs of views"
+    )
+    return Decision(obtained, bool(corner > straight and rank.statistic > 0 and rank.pvalue < 0.05), effect)
 
 
-@claim("worse-in-corners", "32", "the median error is larger at positions near corners")
+@claim(
+    "worse-in-corners",
+    "32",
+    "the median error is larger at positions near corners, and at the others it is under that of random headings (90)",
+    not_quick=QUICK_NETWORKS,
+)
 def _worse_in_corners(results: StudyResults) -> Decision:
     """The classifier of the whole route fails in corners more than on straights."""
     every_6th = results.tables["by_selection"].iloc[0]
     corner, straight = (float(every_6th[f"median_error_deg_{part}"]) for part in ("corners", "straights"))
     obtained = {"median error in corners (deg)": corner, "on straights": straight}
-    return Decision(obtained, None if math.isnan(corner) else corner > straight)
+    if math.isnan(corner):
+        return Decision(obtained, None, reason=NO_CORNERS)
+    table = results.tables[f"headings, {EVERY_6TH}"]
+    label = "in corners minus on straights, one network (deg)"
+    effect = difference_of_medians(label, table, table["in_corner"].to_numpy(bool))
+    return Decision(obtained, corner > straight and straight < CHANCE_MEDIAN_DEG, effect)
 
 
 @claim(
     "more-corner-views-help",
     "32",
-    "more of the headings in the section are less than 45 degrees off",
+    "more of the headings in the section are less than 45 degrees off, and more than of random headings (a quarter)",
     published={
         f"share recovered, {EVERY_6TH}": published.RECOVERED_IN_CORNERS[EVERY_6TH],
         MORE_IN_CORNERS: published.RECOVERED_IN_CORNERS[MORE_IN_CORNERS],
     },
+    not_quick=QUICK_NETWORKS,
 )
 def _more_views_help(results: StudyResults) -> Decision:
     """Twice as many views in the corners recover more headings there."""
     rows = results.tables["by_selection"].iloc[:2]
     share = [float(row.recovered_in_section / max(1, row.places_in_section)) for row in rows.itertuples()]
-    testable = int(rows["places_in_section"].iloc[0]) and int(results.tables["change"]["in_corner"].sum())
     obtained = {f"share recovered, {EVERY_6TH}": share[0], MORE_IN_CORNERS: share[1]}
-    return Decision(obtained, share[1] > share[0] if testable else None)
+    if not (any(results.tables["change"]["in_corner"]) and rows["places_in_section"].iloc[0]):
+        return Decision(obtained, None, reason=f"{NO_CORNERS} with grid positions near them")
+    tables = (results.tables[f"headings, {name}"] for name in (MORE_IN_CORNERS, EVERY_6TH))
+    more, fewer = (
+        (table["error_deg"] < RECOVERED_DEG)[table["in_section"].astype(bool)].to_numpy(float) for table in tables
+    )
+    effect = effect_size(
+        "share recovered with more views minus that without, one network each",
+        len(more),
+        lambda chosen: float((more - fewer)[chosen].mean()),
+        of="positions",
+    )
+    return Decision(obtained, share[1] > max(share[0], CHANCE_RECOVERED), effect)
 
 
 CLAIMS = (_views_differ, _worse_in_corners, _more_views_help)

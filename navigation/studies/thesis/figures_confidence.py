@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ...reports.drawing import GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, WIDE, canvas, draw_over_circle
+from ...reports.drawing import GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, WIDE, canvas, draw_over_circle, legend_above
 from ...reports.results import StudyResults
 from .heading_maps import draw_heading_map, heading_maps
 from .items import figure
@@ -29,7 +29,7 @@ def _short_and_long(results: StudyResults, data: StudyData) -> Figure:
 def _reversed(results: StudyResults, data: StudyData) -> Figure:
     """The positions near straights with the smallest and the largest heading error (circled), and the confidence at every rotation
     there. The network was not trained on views behind it."""
-    drawn, axes = canvas((7.2, 6.0), 1, 2, width_ratios=(1, 1.6))
+    drawn, axes = canvas((7.2, 3.8), 1, 2, width_ratios=(1, 1.6))
     table = results.tables["headings_long"]
     draw_heading_map(axes[0, 0], table, data)
     for name, colour in (("recovered", GOOD_COLOUR), ("reversed", PATH_COLOUR)):
@@ -38,7 +38,7 @@ def _reversed(results: StudyResults, data: StudyData) -> Figure:
         curve = _curve(results, name, results.numbers["iterations"][1])
         draw_over_circle(axes[0, 1], curve["degrees_off"], curve["confidence"], name, colour)
     axes[0, 1].set_ylabel("confidence")
-    axes[0, 1].legend(frameon=False, fontsize=8)
+    legend_above(axes[0, 1])
     return drawn
 
 
@@ -71,8 +71,9 @@ def _beyond(results: StudyResults, data: StudyData) -> Figure:
     axis.plot(table["median_error_deg_corners"], rows, "o", color=PATH_COLOUR, ms=4, label="in corners")
     axis.plot(table["median_error_deg_straights"], rows, "o", color=GOOD_COLOUR, ms=4, label="on straights")
     axis.set_yticks(rows, [f"{row.model}, {row.encoding}, {row.views}" for row in table.itertuples()])
-    axis.set(xlabel="median error (degrees)", xlim=(0, 180), xticks=range(0, 181, 45))
-    axis.legend(frameon=False, fontsize=8)
+    axis.set_xlabel("median error (degrees)")
+    axis.set_xlim(left=0)
+    legend_above(axis)
     return drawn
 
 

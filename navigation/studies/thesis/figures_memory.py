@@ -15,6 +15,8 @@ from ...reports.drawing import (
     canvas,
     draw_lines,
     draw_panorama,
+    label_errors,
+    legend_above,
 )
 from ...reports.maps import draw_map, draw_route, map_axes
 from ...reports.results import StudyResults
@@ -57,6 +59,7 @@ def _by_frequency(results: StudyResults, data: StudyData) -> Figure:
     }
     draw_lines(axes[0, 0], table["every"], curves)
     axes[0, 0].set_xlabel(EVERY_NTH)
+    legend_above(axes[0, 0])
     return drawn
 
 
@@ -65,7 +68,8 @@ def _frequency_boxes(results: StudyResults, data: StudyData) -> Figure:
     """Quartiles (boxes), values within 1.5 box lengths of them (whiskers), medians (lines) and means (dots)."""
     drawn, axes = canvas()
     _draw_error_boxes(axes[0, 0], results.tables["by_frequency"], "every")
-    _label_errors(axes[0, 0], EVERY_NTH)
+    axes[0, 0].set_xlabel(EVERY_NTH)
+    label_errors(axes[0, 0])
     return drawn
 
 
@@ -83,6 +87,7 @@ def _by_factor(results: StudyResults, data: StudyData) -> Figure:
     rows = table[(table["resizing"] == "averaged") & ~table["smoothed"]]
     draw_lines(axis, rows["factor"], {"averaged": (rows["median_error_deg"], GOOD_COLOUR, "s-")})
     axis.set_xlabel("resize factor")
+    legend_above(axis)
     return drawn
 
 
@@ -97,8 +102,10 @@ def _factor_boxes(results: StudyResults, data: StudyData) -> Figure:
         axes[0, 1].plot(rows["factor"], rows["published_mean_error_deg"], "--", color=colour, lw=1)
         means = {name: (rows["mean_error_deg"], colour, "o-")}
         draw_lines(axes[0, 1], rows["factor"], means, ylabel="mean error (degrees)")
-    _label_errors(axes[0, 0], "resize factor")
-    axes[0, 1].set_xlabel("resize factor")
+    label_errors(axes[0, 0])
+    for axis in axes[0]:
+        axis.set_xlabel("resize factor")
+    legend_above(axes[0, 1])
     return drawn
 
 
@@ -111,10 +118,6 @@ def _preprocessing(results: StudyResults, data: StudyData) -> Figure:
     draw_panorama(axes[1, 0], ENCODING(view[None])[0].numpy(), str(ENCODING))
     axes[0, 0].set_xlabel("")
     return drawn
-
-
-def _label_errors(axes: Axes, xlabel: str) -> None:
-    axes.set(xlabel=xlabel, ylabel="error (degrees)", ylim=(0, 180), yticks=range(0, 181, 45))
 
 
 def _draw_error_boxes(

@@ -3,7 +3,16 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...reports.drawing import CURVE_COLOUR, PATH_COLOUR, ROUTE_COLOUR, SOFT_COLOUR, WIDE, canvas, empty_figure
+from ...reports.drawing import (
+    CURVE_COLOUR,
+    PATH_COLOUR,
+    ROUTE_COLOUR,
+    SOFT_COLOUR,
+    WIDE,
+    canvas,
+    empty_figure,
+    from_zero,
+)
 from ...reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from ...reports.results import StudyResults
 from .corners import EVERY_6TH, MORE_IN_CORNERS
@@ -21,7 +30,7 @@ def _uses_of_views(results: StudyResults, data: StudyData) -> Figure:
     for use, colour in (("not used", SOFT_COLOUR), ("learned", ROUTE_COLOUR), ("held out", PATH_COLOUR)):
         rows = table[table["use"] == use]
         axes[0, 0].plot(rows["x_m"], rows["y_m"], "o", ms=1.5 if use == "not used" else 3.5, color=colour, label=use)
-    axes[0, 0].legend(fontsize=8)
+    axes[0, 0].legend(fontsize="small")
     draw_map(axes[0, 0], data.world, data.route.xy)
     return drawn
 
@@ -93,11 +102,12 @@ def _change(results: StudyResults, data: StudyData) -> Figure:
     drawn, axes = canvas()
     axis, table = axes[0, 0], results.tables["change"]
     axis.plot(table["along_m"], table["rms"], "o-", ms=3, color=CURVE_COLOUR, lw=1.2)
-    axis.set(xlabel="along the route (m)", ylabel="RMS difference (grey levels)", ylim=(0, None))
+    axis.set(xlabel="along the route (m)", ylabel="RMS difference (grey levels)")
+    from_zero(axis)
     other = axis.twinx()
     other.fill_between(table["along_m"], table["turning_deg"], color=PATH_COLOUR, alpha=0.2, lw=0)
     other.set_ylabel("turning (degrees)", color=PATH_COLOUR)
-    other.set_ylim(0, 180)
+    from_zero(other)
     section = table.loc[table["in_section"], "along_m"]
     axis.axvspan(section.min(), section.max(), color="#00000010", lw=0)
     return drawn

@@ -15,6 +15,8 @@ from ...reports.drawing import (
     draw_over_circle,
     draw_panorama,
     empty_figure,
+    from_zero,
+    label_errors,
 )
 from ...reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from ...reports.results import StudyResults
@@ -52,10 +54,10 @@ def _image_differences(results: StudyResults, data: StudyData) -> Figure:
         draw_over_circle(axis, curve["degrees_off"], curve["rms"])
         away = f"{name}, {curve['distance_m'].iloc[0]:.2f} m away"
         axis.set_title("the same position" if name == "same" else away)
-        axis.set_ylim(bottom=0)
+        from_zero(axis)
         axis.set_xlabel("")
     axes[0, 0].set_ylabel("RMS difference")
-    drawn.supxlabel("degrees left of the reference's heading", fontsize=9)
+    drawn.supxlabel("degrees left of the reference's heading", fontsize="medium")
     return drawn
 
 
@@ -90,7 +92,7 @@ def _ambiguous(results: StudyResults, data: StudyData) -> Figure:
         draw_over_circle(axis, curve["degrees_off"], curve["rms"])
         row = curve.iloc[0]
         position = f"({row['x_m']:.1f}, {row['y_m']:.1f}) m"
-        axis.set_title(f"{position}: {row['minima']:.0f} minima, {row['error_deg']:.0f}° off", fontsize=9)
+        axis.set_title(f"{position}: {row['minima']:.0f} minima, {row['error_deg']:.0f}° off")
     axes[0, 0].set_ylabel("RMS difference")
     return drawn
 
@@ -109,7 +111,7 @@ def _occluded(results: StudyResults, data: StudyData) -> Figure:
     draw_panorama(axes[1, 0], data.route_views[int(row["reference"])], title)
     draw_over_circle(axes[2, 0], table["degrees_off"], table["rms"])
     axes[2, 0].set(ylabel="RMS difference", xlim=(180, -180))  # left on the left, as in the panoramas
-    axes[2, 0].set_title(f"{row['error_deg']:.0f}° off", fontsize=9)
+    axes[2, 0].set_title(f"{row['error_deg']:.0f}° off")
     for axis in axes[:2, 0]:
         axis.set_xlabel("")
     return drawn
@@ -126,6 +128,6 @@ def _error_by_distance(results: StudyResults, data: StudyData) -> Figure:
         table = around[around["reference"] == reference]
         axis.plot(table["distance_m"], table["error_deg"], "o", ms=3.5, color=colour, alpha=0.8)
     axis.plot(rings["from_m"] + 0.05, rings["median_error_deg"], "-", color=CURVE_COLOUR, lw=2)
-    axis.set(xlabel="distance from the reference view (m)", ylabel="error (degrees)")
-    axis.set(ylim=(-4, 184), yticks=range(0, 181, 45))
+    axis.set_xlabel("distance from the reference view (m)")
+    label_errors(axis)
     return drawn

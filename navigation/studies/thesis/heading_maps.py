@@ -34,7 +34,7 @@ def draw_heading_map(
     positions = table[["x_m", "y_m"]].to_numpy()
     draw_map(axes, data.world, np.vstack([route.xy, positions]) if whole_route else positions)
     count = f"{int(good.sum())} of {len(good)} less than 45° off"
-    axes.set_title(f"{title}\n{count}" if title else count, fontsize=9)
+    axes.set_title(f"{title}\n{count}" if title else count)
 
 
 def heading_maps(tables: Mapping[str, pd.DataFrame], data: StudyData, titles: Mapping[str, str]) -> Figure:

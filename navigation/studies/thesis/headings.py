@@ -11,6 +11,8 @@ from ...evaluation import BATCH, RECOVERED_DEG, errors_of_views
 from ...models.base import FamiliarityModel, Images
 from .study_data import StudyData
 
+CHANCE_MEDIAN_DEG, CHANCE_RECOVERED = 90.0, RECOVERED_DEG / 180  # of random headings over the full circle
+
 
 def headings(
     data: StudyData,

@@ -10,6 +10,11 @@ FACTOR = 6  # of resizing (4.3.4)
 SMOOTHING = 1.1  # standard deviation of the Gaussian (pixels of the view), that of OpenCV's 5 x 5 kernel; the thesis does not give it
 ENCODING = Encoding.parse(f"grey | blur {SMOOTHING:g} | sample {FACTOR}")  # sampled as cv2.resize does (4.4.1)
 
+# Why quick runs cannot test claims.
+QUICK_NETWORKS = "--quick trains networks for a sixth of the iterations, from one start"
+QUICK_SEARCHES = "--quick searches few tunings, with a fifth of the iterations"
+QUICK_FACTORS = "--quick has four of the ten resize factors"
+
 
 @settings
 class StudySettings:

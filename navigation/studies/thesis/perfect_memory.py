@@ -1,5 +1,7 @@
 """Studies 3 and 4: perfect memory, by the number and the resolution of its training views (section 4.3)."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 from scipy.stats import spearmanr
@@ -7,10 +9,12 @@ from scipy.stats import spearmanr
 from ...encoding import Encoding
 from ...models import make_model
 from ...reports.claims import Decision, Numbers, claim
+from ...reports.effects import Effect, effect_size
 from ...reports.results import StudyResults
 from . import published
+from .effects import over_columns
 from .headings import box_of, errors_of, headings
-from .parameters import ENCODING, SMOOTHING, Progress, StudySettings
+from .parameters import ENCODING, QUICK_FACTORS, SMOOTHING, Progress, StudySettings
 from .study_data import StudyData
 
 FREQUENCIES = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 25, 30)
@@ -93,7 +97,15 @@ def _outliers(results: StudyResults) -> Decision:
     """Perfect memory recovers most headings; a few are completely wrong and raise the mean."""
     errors = errors_of(results.tables["headings"])
     median, mean = errors["median_error_deg"], errors["mean_error_deg"]
-    return Decision({"median error (deg)": median, "mean error (deg)": mean}, median < 45 and mean >= 2 * median)
+    each = results.tables["headings"]["error_deg"].to_numpy()
+    effect = effect_size(
+        "mean minus median (deg)",
+        len(each),
+        lambda rows: float(each[rows].mean() - np.median(each[rows])),
+        of="positions",
+    )
+    obtained = {"median error (deg)": median, "mean error (deg)": mean}
+    return Decision(obtained, median < 45 and mean >= 2 * median, effect)
 
 
 @claim(
@@ -109,7 +121,13 @@ def _error_and_frequency(results: StudyResults) -> Decision:
     shown = [every for every in (1, 6, 10, 20, 30) if every in medians]
     obtained = {f"median error, every {every} (deg)": float(medians[every]) for every in shown}
     obtained["rank correlation"] = float(rank.statistic)
-    return Decision(obtained, bool(rank.statistic > 0 and rank.pvalue < 0.01))
+    effect = over_columns(
+        "rank correlation",
+        results.tables["errors"],
+        "every",
+        lambda errors: spearmanr(boxes["every"], errors).statistic,
+    )
+    return Decision(obtained, bool(rank.statistic > 0 and rank.pvalue < 0.01), effect)
 
 
 def _medians(results: StudyResults, column: str, resizing: str, smoothed: bool, factors: range) -> np.ndarray:
@@ -134,6 +152,7 @@ def _by_resolution(results: StudyResults, column: str) -> Numbers:
     "at factors 1 to 4 no median is over 1.5 times another; at factors 8 to 10 their mean is at least a quarter higher",
     published=lambda results: _by_resolution(results, "published_median_error_deg"),
     note="Tested on views that are sampled, as cv2.resize does by default. Where views are averaged instead, no detail aliases.",
+    not_quick=QUICK_FACTORS,
 )
 def _flat_then_rises(results: StudyResults) -> Decision:
     """The median error is flat at small resize factors, then rises."""
@@ -145,7 +164,13 @@ def _flat_then_rises(results: StudyResults) -> Decision:
         )
         for factors in (FINE, COARSE)
     }
-    return Decision(sampled | averaged, bool(ratio <= 1.5 and coarse / fine >= 1.25))
+    effect = _over_factors(
+        results,
+        "factors 8 to 10 over factors 1 to 4",
+        [False],
+        lambda errors, factors: errors[np.isin(factors, COARSE)].mean() / errors[np.isin(factors, FINE)].mean(),
+    )
+    return Decision(sampled | averaged, bool(ratio <= 1.5 and coarse / fine >= 1.25), effect)
 
 
 def _by_smoothing(results: StudyResults, column: str) -> Numbers:
@@ -162,12 +187,19 @@ def _by_smoothing(results: StudyResults, column: str) -> Numbers:
     "7.3",
     "over factors 3 to 8 the mean of the medians is lower with smoothing, and the median at more than half of the factors",
     published=lambda results: _by_smoothing(results, "published_median_error_deg"),
+    not_quick=QUICK_FACTORS,
 )
 def _smoothing_helps(results: StudyResults) -> Decision:
     """Gaussian smoothing lowers the error at middle resolutions."""
     obtained = _by_smoothing(results, "median_error_deg")
     without, smoothed, share = obtained.values()
-    return Decision(obtained, smoothed < without and share > 0.5)
+
+    def gain(errors: np.ndarray, factors: np.ndarray) -> float:
+        first, second = errors.reshape(2, -1)[:, np.isin(factors[: len(factors) // 2], MIDDLE)]
+        return float(np.mean(first - second))
+
+    effect = _over_factors(results, "error without smoothing minus that with it (deg)", [False, True], gain)
+    return Decision(obtained, smoothed < without and share > 0.5, effect)
 
 
 @claim(
@@ -179,13 +211,29 @@ def _smoothing_helps(results: StudyResults) -> Decision:
         "best factor, table of 7.3": float(1 + np.argmin(published.RESIZED_SMOOTHED["median_error_deg"])),
     },
     note="The thesis's text gives factor 6 as the best; its own table has the lowest error at factor 3.",
+    not_quick=QUICK_FACTORS,
 )
 def _best_factor(results: StudyResults) -> Decision:
     """A middle resolution is better than the original one."""
     boxes = results.tables["by_factor"]
     smoothed = boxes[(boxes["resizing"] == "sampled") & boxes["smoothed"]]
     best = float(smoothed.loc[smoothed["median_error_deg"].idxmin(), "factor"])
-    return Decision({"best factor": best}, 1 < best < max(published.FACTORS))
+    effect = _over_factors(results, "best factor", [True], lambda errors, factors: factors[errors.argmin()])
+    return Decision({"best factor": best}, 1 < best < max(published.FACTORS), effect)
+
+
+def _over_factors(
+    results: StudyResults,
+    label: str,
+    smoothed: list[bool],
+    statistic: Callable[[np.ndarray, np.ndarray], float],
+) -> Effect:
+    """A number computed from the median errors of sampled views and their resize factors: first those without smoothing, then those
+    with it, as far as they are asked for."""
+    errors = results.tables["errors"]
+    errors = errors[(errors["resizing"] == "sampled") & errors["smoothed"].isin(smoothed)]
+    factors = np.tile(np.sort(errors["factor"].unique()), len(smoothed))
+    return over_columns(label, errors, ["smoothed", "factor"], lambda medians: float(statistic(medians, factors)))
 
 
 FREQUENCY_CLAIMS = (_outliers, _error_and_frequency)

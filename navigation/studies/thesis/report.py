@@ -7,7 +7,7 @@ from typing import Any
 
 from tussock.world.errors import SettingError
 
-from ...reports.claims import Outcome, check_claims
+from ...reports.claims import Outcome, check_claims, count_outcomes
 from ...reports.report import Block, ClaimBox, ClaimTable, Command, Drawing, Report, Section, Table, Text, write_report
 from ...reports.results import StudyResults
 from . import published
@@ -46,10 +46,12 @@ PUBLISHED: dict[str, dict[str, Any]] = {
 }
 
 
-def outcomes_of(runs: Runs) -> dict[str, list[Outcome]]:
+def outcomes_of(runs: Runs, *, quick: bool) -> dict[str, list[Outcome]]:
     """The outcomes of each study's claims over all seeds."""
     first, *_ = runs.values()
-    return {name: check_claims(STUDIES[name].claims, [run[name] for run in runs.values()]) for name in first}
+    return {
+        name: check_claims(STUDIES[name].claims, [run[name] for run in runs.values()], quick=quick) for name in first
+    }
 
 
 def items_of(studies: Collection[str], only: str | None = None) -> list[Item]:
@@ -82,6 +84,7 @@ def write_thesis_report(
     command: Callable[[Item], str],
     title: str,
     only: str | None = None,
+    quick: bool = False,
 ) -> dict[str, list[Outcome]]:
     """Write the report of a replication. Its figures and tables are those of the first seed.
 
@@ -93,12 +96,13 @@ def write_thesis_report(
         command: Gives the command line that makes one figure or table alone.
         title: Title of the report.
         only: Number of the one figure or table to make.
+        quick: The studies were done as a first look, which cannot test all claims.
 
     Returns:
         The outcomes of each study's claims.
     """
     first, *_ = runs.values()
-    outcomes = outcomes_of(runs)
+    outcomes = outcomes_of(runs, quick=quick)
     items = items_of(first, only)
     all_outcomes = list(chain.from_iterable(outcomes.values()))
     blocks: list[Block] = []
@@ -110,7 +114,13 @@ def write_thesis_report(
         ]
         blocks.append(Section(title=STUDIES[name].title, anchor=name, blocks=sections))
     report = Report(
-        title=title, lead=LEAD, about=about, blocks=blocks, footer=FOOTER, results=_results(runs, outcomes, about)
+        title=title,
+        lead=LEAD,
+        about=about,
+        blocks=blocks,
+        footer=FOOTER,
+        results=_results(runs, outcomes, about),
+        headline=f"{count_outcomes(all_outcomes)}." if all_outcomes else "",
     )
     write_report(report, folder)
     return outcomes
@@ -152,20 +162,21 @@ def _results(runs: Runs, outcomes: dict[str, list[Outcome]], about: dict[str, An
     claims = {}
     for outcome in chain.from_iterable(outcomes.values()):
         spreads = {label: spread._asdict() for label, spread in outcome.spreads.items()}
-        claims[outcome.claim.key] = outcome.description | {"obtained": spreads, "holds": outcome.holds}
+        judged = {"obtained": spreads, "holds": outcome.holds} | outcome.evidence
+        claims[outcome.claim.key] = outcome.description | judged
     seeds = {
-        str(seed): {name: _results_of(name, run[name], check_claims(STUDIES[name].claims, [run[name]])) for name in run}
-        for seed, run in runs.items()
+        str(seed): {name: _results_of(name, run[name], outcomes[name], k) for name in run}
+        for k, (seed, run) in enumerate(runs.items())
     }
     return {"version": 1, "about": about, "claims": claims, "seeds": seeds}
 
 
-def _results_of(name: str, results: StudyResults, outcomes: list[Outcome]) -> dict[str, Any]:
-    """The results of a study with one seed. outcomes: of its claims with this seed."""
+def _results_of(name: str, results: StudyResults, outcomes: list[Outcome], run: int) -> dict[str, Any]:
+    """The results of a study with one seed. outcomes: of its claims; run: number of this seed in them."""
     claims = {each.claim.key: each for each in outcomes}
     return {
-        "published": {key: each.published for key, each in claims.items()} | PUBLISHED.get(name, {}),
-        "obtained": {key: each.obtained[0] for key, each in claims.items()} | results.numbers,
-        "holds": {key: each.holds[0] for key, each in claims.items()},
+        "published": {key: each.claim.published_for(results) for key, each in claims.items()} | PUBLISHED.get(name, {}),
+        "obtained": {key: each.obtained[run] for key, each in claims.items()} | results.numbers,
+        "holds": {key: each.holds[run] for key, each in claims.items()},
         "tables": results.to_json()["tables"],
     }

@@ -14,6 +14,7 @@ from ...models.base import Images
 from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...scan import best_turn
+from .effects import over_parts
 from .headings import relative_to_set_heading
 from .parameters import Progress, StudySettings
 from .study_data import StudyData
@@ -184,7 +185,9 @@ def _lowest_differences(results: StudyResults) -> Decision:
         "nearby": float(medians["near"]),
         "far away": float(medians["far"]),
     }
-    return Decision(obtained, bool((lowest["same"] < 1e-3).all() and (lowest["near"] >= lowest["far"]).sum() <= 1))
+    holds = bool((lowest["same"] < 1e-3).all() and (lowest["near"] >= lowest["far"]).sum() <= 1)
+    rise = np.split((lowest["far"] - lowest["near"]).to_numpy(), len(lowest))
+    return Decision(obtained, holds, over_parts("far away minus nearby (grey levels)", rise, np.median))
 
 
 @claim("visual-compass-near", "8", "over half of the headings within 0.25 m are less than 45 degrees off")
@@ -195,7 +198,14 @@ def _recovered_nearby(results: StudyResults) -> Decision:
         "share recovered within 0.25 m": near,
         "at 0.25 to 0.5 m": results.numbers["share_recovered_beyond_0.25_m"],
     }
-    return Decision(obtained, near > 0.5)
+    around = results.tables["around"]
+    recovered = _by_reference(around[around["distance_m"] <= MAX_DISTANCE / 2], "error_deg")
+    effect = over_parts(
+        "share recovered within 0.25 m",
+        recovered,
+        lambda errors: np.mean(errors < RECOVERED_DEG) if len(errors) else np.nan,
+    )
+    return Decision(obtained, near > 0.5, effect)
 
 
 @claim("error-grows-with-distance", "11", "the rank correlation of error and distance is positive (p < 0.01)")
@@ -208,7 +218,17 @@ def _error_and_distance(results: StudyResults) -> Decision:
         for ring in (rings.iloc[0], rings.iloc[-1])
     }
     obtained["rank correlation"] = float(rank.statistic)
-    return Decision(obtained, bool(rank.statistic > 0 and rank.pvalue < 0.01))
+    effect = over_parts(
+        "rank correlation",
+        _by_reference(around, ["distance_m", "error_deg"]),
+        lambda pairs: spearmanr(*pairs.T).statistic,
+    )
+    return Decision(obtained, bool(rank.statistic > 0 and rank.pvalue < 0.01), effect)
+
+
+def _by_reference(around: pd.DataFrame, columns: str | list[str]) -> list[np.ndarray]:
+    """Columns of the positions around each reference view."""
+    return [part[columns].to_numpy() for _, part in around.groupby("reference")]
 
 
 CLAIMS = (_lowest_differences, _recovered_nearby, _error_and_distance)
