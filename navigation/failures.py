@@ -244,7 +244,7 @@ class Diagnostics:
         assert self._learned is not None
         (encoding, poses), views = self._learned, self._views
         if views is None:
-            views, poses = training_views(encoding, self._renderer, poses)
+            views, poses = training_views(encoding, self._renderer, poses, warn=False)
         return LearnedViews(views, self._mask), poses
 
     @property

@@ -242,6 +242,16 @@ def test_a_mirrored_world_gives_the_same_cause(name):
     assert abs(abs(image.error) - abs(diagnosis.error)) < 1e-3
 
 
+@pytest.mark.parametrize("model", ["random", "opponent-random"])
+def test_a_control_that_recognises_nothing_fails_by_chance(model):
+    """In the rooms where others have a cause: its headings do not depend on what it learned."""
+    poor = [diagnosis for case, _ in CASES.values() if (diagnosis := first_step(case, model)[1]) is not None]
+    assert len(poor) > len(CASES) / 3
+    assert {(each.cause, each.recognised) for each in poor} == {(Cause.UNEXPLAINED, None)}
+    assert all("off the route's" in str(each) for each in poor)
+    assert any(each.nearest > CATCHMENT for each in poor)
+
+
 def test_a_good_step_has_no_diagnosis():
     assert first_step(Case(NEAR, turn=0.0))[1] is None
     # 60 degrees off the route's heading, but on the way back to it: 0.3 m ahead, from 0.4 m to its side.

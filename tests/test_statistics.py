@@ -157,3 +157,6 @@ def test_evidence_is_that_of_the_step():
     assert describe_evidence(steps.iloc[0]) is None
     assert "2.50 m" in str(describe_evidence(steps.iloc[2]))
     assert "60 degrees" in str(describe_evidence(steps.iloc[3]))
+    chance = steps.iloc[2].copy()  # of a control that recognises nothing, far from all learned views
+    chance["cause"], chance["nearest_view_m"] = "unexplained", 3.0
+    assert str(describe_evidence(chance)).startswith("unexplained, the heading is 90 degrees")

@@ -764,7 +764,7 @@ def test_the_pose_of_a_learned_view_counts_views_without_contrast_out(monkeypatc
     """Also where all views before it are without contrast. No more are drawn than it takes."""
     drawn = []
 
-    def training_views(encoding, renderer, poses):
+    def training_views(encoding, renderer, poses, warn):
         drawn.append(len(poses))
         learned = poses[[pose[0] // 3 not in hidden for pose in poses]]
         if not len(learned):

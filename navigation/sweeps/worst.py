@@ -74,7 +74,7 @@ def learned_pose(
         some = poses[count : count + number + 1 - len(learned)]  # no more views are drawn than it takes
         count += len(some)
         with suppress(SettingError):  # none of these was learned
-            learned = np.concatenate([learned, training_views(experiment.encoding, renderer, some)[1]])
+            learned = np.concatenate([learned, training_views(experiment.encoding, renderer, some, warn=False)[1]])
     return learned[[number]]
 
 
