@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from commands import printed, tussock
 
+from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import key_of, route_key, training_key
 from tussock.navigation.stopping import StopReason
