@@ -8,7 +8,10 @@ from scipy.stats import t as student
 
 CONFIDENCE = 0.95
 MIN_WORLDS = 5  # with fewer there is no interval: too little is known of how much worlds differ
-SHARES, CORRELATIONS = 200, 32  # values of the mean share, and of the correlation of runs in one world, that are tried
+SHARES, DEVIATIONS = (
+    200,
+    32,
+)  # values of the mean share, and of the standard deviation of the worlds' shares, that are tried
 
 
 @dataclass(frozen=True)
@@ -36,9 +39,9 @@ def world_sums(
 def share_interval(values: Float[np.ndarray, " n"], worlds: Int[np.ndarray, " n"]) -> Interval:
     """Share of runs, and its interval from a beta-binomial model: each world has a share of its own, drawn from a beta distribution.
 
-    The mean share, and the correlation of runs in one world, are equally likely to have any value before the runs are known (flat priors);
-    the interval holds the mean share with a probability of CONFIDENCE once they are. Where no run has it, or all have, the interval ends at
-    0 or 1.
+    Before the runs are known, any mean share is equally likely, and any standard deviation of the worlds' shares (flat priors; that of the
+    deviation after Gelman 2006). Once they are known, the mean share is in the interval with a probability of CONFIDENCE. Where no run has
+    what is counted, or all have, the interval ends at 0 or 1.
 
     Args:
         values: 1 for a run that has what is counted, else 0.
@@ -58,7 +61,7 @@ def _posterior_of_share(
 ) -> tuple[Float[np.ndarray, " edges"], Float[np.ndarray, " edges"]]:
     """Values of the mean share, and the probabilities that it is below them.
 
-    A world with k of n has the likelihood B(k + a, n - k + b) / B(a, b), with a and b from the mean share and the correlation. It is
+    A world with k of n has the likelihood B(k + a, n - k + b) / B(a, b), with a and b from the mean share and the deviation. It is
     a product of a + i for i < k, b + i for i < n - k and 1 / (a + b + i) for i < n, so the worlds with the same factor are counted.
     """
     worlds = len(runs)
@@ -66,9 +69,11 @@ def _posterior_of_share(
     reach = 6 * np.sqrt(middle * (1 - middle) / worlds)  # 6 standard errors, if all runs in a world were alike
     edges = np.linspace(max(0.0, middle - reach), min(1.0, middle + reach), SHARES + 1)
     share = ((edges[1:] + edges[:-1]) / 2)[:, None]
-    correlation = (np.arange(CORRELATIONS) + 0.5) / CORRELATIONS
-    total = (1 - correlation) / correlation  # a + b
-    logarithm = np.zeros((SHARES, CORRELATIONS))
+    deviation = (
+        np.arange(DEVIATIONS) + 0.5
+    ) / DEVIATIONS  # as a share of the greatest possible one; its square is 1 / (a + b + 1)
+    total = 1 / deviation**2 - 1  # a + b
+    logarithm = np.zeros((SHARES, DEVIATIONS))
     for i in range(int(runs.max())):
         logarithm += np.sum(having > i) * np.log(share * total + i)
         logarithm += np.sum(runs - having > i) * np.log((1 - share) * total + i)

@@ -44,7 +44,8 @@ def test_with_one_run_in_each_world_a_share_has_the_beta_interval(having, worlds
 def test_the_interval_of_a_share_is_that_of_the_beta_binomial_model():
     """Its posterior by brute force, from scipy's distribution of the runs of each world."""
     having, runs = np.array([0, 3, 4, 1, 5, 2]), np.array([3, 4, 6, 2, 5, 9])
-    mean, correlation = np.meshgrid((np.arange(300) + 0.5) / 300, (np.arange(60) + 0.5) / 60, indexing="ij")
+    mean, deviation = np.meshgrid((np.arange(300) + 0.5) / 300, (np.arange(60) + 0.5) / 60, indexing="ij")
+    correlation = deviation**2
     a, b = mean * (1 / correlation - 1), (1 - mean) * (1 / correlation - 1)
     likelihood = np.prod([stats.betabinom.pmf(k, n, a, b) for k, n in zip(having, runs, strict=True)], axis=0)
     probability = likelihood.sum(axis=1).cumsum() / likelihood.sum()

@@ -47,7 +47,7 @@ def test_runs_in_one_world_are_one_group():
 
 def test_models_are_compared_on_runs_that_are_equal_in_everything_else():
     rows = [
-        {"model": model, "offset_m": offset, "world": "w", "world_seed": seed, "route": None, "route_seed": None, "route_length_m": 8.0,
+        {"model": model, "offset_m": offset, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "route_length_m": 8.0,
          "seed": 0, "arrived": model == "good" or offset == 0, "mean_deviation_m": 0.1 if model == "good" else 0.3}
         for model in ("bad", "good") for offset in (0.0, 0.1) for seed in range(6)
     ]  # fmt: skip
@@ -70,7 +70,7 @@ def test_models_are_compared_on_runs_that_are_equal_in_everything_else():
 def test_p_values_are_corrected_for_all_pairs():
     """Of three models, two of which are alike."""
     rows = [
-        {"model": model, "world": "w", "world_seed": seed, "route": None, "route_seed": None, "seed": 0, "arrived": model != "c"}
+        {"model": model, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "seed": 0, "arrived": model != "c"}
         for model in "abc" for seed in range(8)
     ]  # fmt: skip
     pairs = pairings(pd.DataFrame(rows), ["model", "world_seed"], ["arrived"], ["model"])
@@ -81,7 +81,7 @@ def test_p_values_are_corrected_for_all_pairs():
 
 def test_there_is_no_interval_and_no_test_with_too_few_worlds():
     rows = [
-        {"model": model, "world": "w", "world_seed": seed, "route": None, "route_seed": None, "seed": run, "arrived": run < 3}
+        {"model": model, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "seed": run, "arrived": run < 3}
         for model in "ab" for seed in range(4) for run in range(5)
     ]  # fmt: skip
     frame = pd.DataFrame(rows)

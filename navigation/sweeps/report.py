@@ -16,11 +16,11 @@ from ..reports.results import plain_json
 from .figures import along_axis
 from .statistics import (
     MAX_CHOICES,
-    MEASURES,
     axes_of,
     axis_label,
     by_axis,
     choice_label,
+    measures_of,
     pairings,
     ranges_of,
     setting_label,
@@ -74,7 +74,7 @@ def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_
         raise FileError(f"no run in {folder} could be completed; the first: {table['error'].iloc[0]}")
     axes = axes_of(completed, list(TYPES))
     completed = completed.assign(**_ranges(completed, axes))
-    measures = [name for name in MEASURES if name != "resets" or completed["resets"].to_numpy().any()]
+    measures = measures_of(completed)
     results = plain_json(_results(table, completed, axes, measures, shown))
     report = Report(
         title=f"Sweep {folder.resolve().name}",

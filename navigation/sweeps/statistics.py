@@ -131,6 +131,11 @@ def choice_label(key: object) -> str:
     )
 
 
+def measures_of(table: pd.DataFrame) -> list[str]:
+    """The measures that a report of runs shows; resets only where there were any."""
+    return [name for name in MEASURES if name != "resets" or table["resets"].to_numpy().any()]
+
+
 def summary(table: pd.DataFrame, measures: Sequence[str]) -> Summary:
     """Runs in numbers, with the mean and interval of each measure."""
     return _summary(table, measures, worlds_of(table))

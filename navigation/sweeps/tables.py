@@ -4,10 +4,14 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import pandas as pd
+
+from ..experiment_settings import TYPES
 from ..intervals import MIN_WORLDS
 from ..reports.page import format_value
-from ..reports.report import Cell, Table
-from .statistics import MEASURES, Pairing, Summary
+from ..reports.report import Block, Cell, Table, Text
+from ..reports.results import plain_json
+from .statistics import MEASURES, Pairing, Summary, axes_of, by_axis, measures_of, pairings
 
 INTERVALS = (
     "Numbers in parentheses are 95 % confidence intervals. Runs in one world are not independent, so intervals are over worlds (in a world "
@@ -85,3 +89,26 @@ def _interval(interval: Mapping[str, float | None], *, bold: bool = False) -> Ce
     low, high = interval["low"], interval["high"]
     note = "" if low is None else f"({format_value(low)} to {format_value(high)})"
     return Cell(text=format_value(interval["value"]), note=note, bold=bold)
+
+
+def compared_models(walks: pd.DataFrame) -> dict[str, Any]:
+    """The models of a table of walks in numbers, which has their specs in its column "spec": `models`, each alone, and `pairs` of them."""
+    walks = walks.assign(model=walks["spec"])
+    measures = measures_of(walks)
+    axis = next((names for names in axes_of(walks, list(TYPES)).values() if "model" in names), ["model"])
+    found = by_axis(walks, axis, measures)
+    return plain_json(
+        {
+            "models": {choice: summary_numbers(each) for choice, each in found.items()},
+            "pairs": [pairing_numbers(pair) for pair in pairings(walks, list(TYPES), measures, axis)],
+        }
+    )
+
+
+def comparison_blocks(compared: Mapping[str, Any]) -> list[Block]:
+    """What a page shows of `compared_models`."""
+    models, pairs = compared["models"], compared["pairs"]
+    measures = [name for name in MEASURES if all(name in each for each in models.values())]
+    rows = {(name,): each for name, each in models.items()}
+    blocks: list[Block] = [Text(INTERVALS, style="soft"), summary_table(rows, ["model"], measures)]
+    return [*blocks, Text(PAIRS, style="soft"), pair_table(pairs, measures)] if pairs else blocks
