@@ -1,6 +1,8 @@
 """Confidence intervals and tests over worlds: against closed forms and brute force, and how often they are right in simulations."""
 
+import dataclasses
 import tracemalloc
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -181,21 +183,113 @@ def test_holm_rejects_what_its_steps_reject(p_values, level):
 # How often they are right
 
 
-def shares_of_worlds(rng, share, correlation, worlds):
-    precision = 1 / correlation - 1
-    return rng.beta(share * precision, (1 - share) * precision, worlds)
+# Worlds differ in difficulty: the runs of each have a share of their own, drawn from a beta distribution, and what is asked is its mean.
+# Shares "near 0.05" are drawn from 0.02 to 0.08, since with so few runs the coverage of a single share jumps from one to the next.
 
 
-def coverage(find, draw, truth, repeats, seed=0) -> float:
-    """How often (%) the interval of drawn data contains the truth."""
-    rng = np.random.default_rng(seed)
-    intervals = [find(*draw(rng)) for _ in range(repeats)]
-    return 100 * float(np.mean([each.low <= truth <= each.high for each in intervals]))
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A simulation of shares: near what, the correlation of the runs in one world, the number of worlds, and of runs in each."""
+
+    share: float
+    correlation: float
+    worlds: int
+    runs: int
 
 
-def coverage_of_share(share, correlation, worlds, runs, repeats):
-    def draw(rng):
-        having = rng.binomial(runs, shares_of_worlds(rng, share, correlation, worlds))
-        return of_counts(having, [runs] * worlds)
+def coverage_of_share(case: Case, repeats: int) -> float:
+    """How often (%) the interval contains the mean share of all worlds."""
 
-    return coverage(share_interval, draw, share, repeats)
+    @cache
+    def ends_of(*having):  # the order of worlds does not matter
+        return ends(share_interval(*of_counts(having, [case.runs] * case.worlds)))
+
+    rng, inside = np.random.default_rng(0), 0
+    for share in rng.uniform(case.share - 0.03, case.share + 0.03, repeats):
+        total = 1 / case.correlation - 1
+        having = rng.binomial(case.runs, rng.beta(share * total, (1 - share) * total, case.worlds))
+        low, high = ends_of(*sorted(having.tolist()))
+        inside += low <= share <= high
+    return 100 * inside / repeats
+
+
+def coverage_of_mean(find, draw, worlds, repeats=2000) -> float:
+    """How often (%) the interval of worlds' means contains 1, the mean that they are drawn with."""
+    rng, number = np.random.default_rng(0), np.arange(worlds)
+    intervals = [find(draw(rng, worlds), number) for _ in range(repeats)]
+    return 100 * float(np.mean([each.low <= 1 <= each.high for each in intervals]))
+
+
+def coverage_of_difference(one: Case, other: Case, repeats: int) -> float:
+    """How often (%) the interval contains the difference of two mean shares, where the same worlds are difficult for both."""
+    rng, inside, worlds = np.random.default_rng(0), 0, np.repeat(np.arange(one.worlds), one.runs)
+    for _ in range(repeats):
+        difficulty = stats.norm.cdf(rng.multivariate_normal([0, 0], [[1, 0.6], [0.6, 1]], one.worlds)).T
+        values = []
+        for case, quantile in zip((one, other), difficulty, strict=True):
+            total = 1 / case.correlation - 1
+            shares = stats.beta.ppf(quantile, case.share * total, (1 - case.share) * total)
+            values.append((rng.random((case.worlds, case.runs)) < shares[:, None]).ravel().astype(float))
+        interval = share_difference_interval(*values, worlds)
+        inside += interval.low <= one.share - other.share <= interval.high
+    return 100 * inside / repeats
+
+
+GRID = [
+    Case(share, correlation, worlds, runs)
+    for runs in (4, 9)
+    for worlds in (5, 10, 20)
+    for correlation in (0.05, 0.15, 0.4)
+    for share in (0.05, 0.5, 0.95)
+]
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case(0.05, 0.15, 5, 4),
+        Case(0.5, 0.4, 5, 4),
+        Case(0.95, 0.15, 5, 4),
+        Case(0.05, 0.15, 10, 4),
+        Case(0.95, 0.15, 20, 4),
+    ],
+    ids=str,
+)
+def test_the_interval_of_a_share_contains_it_as_often_as_stated(case):
+    assert 93 <= coverage_of_share(case, 3000) <= 97
+
+
+@pytest.mark.slow
+def test_the_interval_of_a_share_contains_it_as_often_as_stated_in_the_whole_grid():
+    """Up to cases with five worlds that hardly differ, or differ very much, which no interval can know from five worlds."""
+    covered = {case: coverage_of_share(case, 1500) for case in GRID}
+    assert 94 < np.mean(list(covered.values())) < 96
+    assert np.mean([93 <= each <= 97 for each in covered.values()]) > 0.85
+    assert all(91.5 < each < 99 for each in covered.values()), covered
+
+
+@pytest.mark.parametrize("worlds", [5, 10, 20])
+@pytest.mark.parametrize(
+    ("shape", "least"), [(11, 93), (4, 93), (1, 92)]
+)  # of gamma distributions; 1 is the exponential
+def test_the_interval_of_a_positive_mean_contains_it_as_often_as_stated(shape, least, worlds):
+    assert least <= coverage_of_mean(positive_interval, lambda rng, n: rng.gamma(shape, 1 / shape, n), worlds) <= 97
+
+
+@pytest.mark.parametrize("worlds", [5, 10, 20])
+def test_the_interval_of_a_mean_difference_contains_it_as_often_as_stated(worlds):
+    def draw(rng, n):
+        return 1 + rng.gamma(1, 1, n) - rng.gamma(4, 0.25, n)
+
+    assert 92 <= coverage_of_mean(mean_interval, draw, worlds) <= 97
+
+
+@pytest.mark.parametrize("worlds", [6, 12])
+def test_models_that_are_alike_differ_as_rarely_as_stated(worlds):
+    """The p value is at most 0.05 in at most 5 % of comparisons, however skewed the distributions are."""
+    rng, number = np.random.default_rng(0), np.repeat(np.arange(worlds), 3)
+    p_values = []
+    for _ in range(1500):
+        ease = rng.gamma(1, 1, worlds)[number]
+        p_values.append(sign_flip_p(ease * (rng.gamma(1, 1, len(ease)) - rng.gamma(1, 1, len(ease))), number))
+    assert 0.02 < np.mean(np.array(p_values) <= 0.05) < 0.06

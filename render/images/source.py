@@ -131,7 +131,7 @@ class DatabaseViews:
         """The image that is seen at a pose, for messages."""
         (row,), _ = self._entries.nearest(as_poses(pose[None]))
         database = self._entries.databases[self._entries.owners[row]]
-        return f"{database.folder / database.label(self._entries.rows[row])}"
+        return f"{database.folder / database.label(int(self._entries.rows[row]))}"
 
     def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width channels"]:
         """The views at poses.
