@@ -1,6 +1,7 @@
 """Confidence intervals of shares and means of runs in several worlds, and of their differences (docs/statistics.md)."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -118,6 +119,7 @@ def _mean_and_error(values: Float[np.ndarray, " n"], worlds: Int[np.ndarray, " n
     return mean, error if error > 1e-12 * np.abs(values).max() else np.nan, len(runs)
 
 
+@cache
 def _quantile(worlds: int) -> float:
     return float(student.ppf((1 + CONFIDENCE) / 2, worlds - 1)) if worlds > 1 else np.nan
 

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -55,6 +55,7 @@ def test_the_interval_of_a_share_is_that_of_the_beta_binomial_model():
     assert np.allclose(ends(share_interval(*of_counts(having, runs))), expected, atol=0.004)
 
 
+@settings(max_examples=30)
 @given(st.lists(st.integers(0, 4), min_size=MIN_WORLDS, max_size=12))
 def test_a_share_and_its_complement_are_mirrored(having):
     values, worlds = of_counts(having, [4] * len(having))
@@ -213,7 +214,7 @@ def coverage_of_share(case: Case, repeats: int) -> float:
     return 100 * inside / repeats
 
 
-def coverage_of_mean(find, draw, worlds, repeats=2000) -> float:
+def coverage_of_mean(find, draw, worlds, repeats=1500) -> float:
     """How often (%) the interval of worlds' means contains 1, the mean that they are drawn with."""
     rng, number = np.random.default_rng(0), np.arange(worlds)
     intervals = [find(draw(rng, worlds), number) for _ in range(repeats)]
