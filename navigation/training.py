@@ -170,9 +170,8 @@ def _warn_of_contrast(
     x, y, _ = poses[first].tolist()
     where = source.label(poses[first]) if isinstance(source, DatabaseViews) else f"at x {x:.2f} m, y {y:.2f} m"
     log.warning(
-        "%d of %d training views are constant or nearly constant in the encoding '%s' (the first: %s); %d of them show nothing and are not "
-        "learned. Look whether something covers the eye there, or an image lacks the transparency that foreground-mask needs, or choose "
-        "another --encoding",
+        "%d of %d training views are constant or nearly so in the encoding '%s' (the first: %s); %d are not learned. Where something "
+        "covers the eye this is right; else choose another --encoding (foreground-mask needs images with transparency)",
         int(weak.sum()),
         len(weak),
         encoding,
