@@ -20,6 +20,7 @@ from .encoding import Encoding
 from .evaluation import RECOVERED_DEG
 from .feature_mask import FeatureMask, is_partial
 from .learned_views import Images, LearnedViews
+from .models.base import recognises
 from .models.files import TrainedModel
 from .training import AHEAD, training_views
 from .walk import Step
@@ -62,6 +63,7 @@ class Diagnosis:
         recognised: Distance from the pose of the learned view that was recognised at the chosen heading (m); None likewise.
         error: Angle between the chosen heading and the route's (rad, -pi..pi).
         turning: How much the route turns within CHORD before and after (rad, 0..pi).
+        recognises: Whether what steers depends on the learned views. A control that does not has no cause but chance.
     """
 
     covered: float | None
@@ -69,10 +71,13 @@ class Diagnosis:
     recognised: float | None
     error: float
     turning: float
+    recognises: bool = True
 
     @property
     def cause(self) -> Cause:
         """The cause that the measurements point to: first what makes a view useless, last what only misleads."""
+        if not self.recognises:
+            return Cause.UNEXPLAINED
         if self.covered is not None and self.covered > MAX_COVERED:
             return Cause.OCCLUSION
         if self.nearest is not None and self.nearest > CATCHMENT:
@@ -120,6 +125,7 @@ class Diagnostics:
             trained.check()
             trained.check_eye(renderer.eye)
         self._renderer, self._route, self._views = renderer, route, views
+        self._recognises = trained is None or recognises(trained.model)
         self._learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None
         if trained is not None and trained.poses is not None and trained.encoding is not None:
             self._learned = trained.encoding, trained.poses
@@ -147,7 +153,12 @@ class Diagnostics:
         )
         for place, step, covered, nearest, recognised, turns in measured:
             diagnoses[place] = Diagnosis(
-                covered=covered, nearest=nearest, recognised=recognised, error=step.error, turning=turns
+                covered=covered,
+                nearest=nearest,
+                recognised=recognised,
+                error=step.error,
+                turning=turns,
+                recognises=self._recognises,
             )
         return diagnoses
 
@@ -210,7 +221,7 @@ class Diagnostics:
         return np.hypot(poses[:, 0] - x, poses[:, 1] - y).min(axis=1).tolist()
 
     def _recognised(self, steps: Sequence[Step]) -> list[float | None]:
-        if self._learned is None:
+        if self._learned is None or not self._recognises:
             return [None] * len(steps)
         _, poses = self._learned
         away: list[float | None] = [None] * len(steps)
@@ -233,7 +244,7 @@ class Diagnostics:
         assert self._learned is not None
         (encoding, poses), views = self._learned, self._views
         if views is None:
-            views, poses = training_views(encoding, self._renderer, poses)
+            views, poses = training_views(encoding, self._renderer, poses, warn=False)
         return LearnedViews(views, self._mask), poses
 
     @property

@@ -26,6 +26,7 @@ AHEAD = 0.3  # m; a view next to the route faces the route this far ahead
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
 BATCH = 64  # views rendered and encoded at once
 MIN_CONTRAST = 1e-3  # standard deviation of a feature image under which there is nothing to recognise
+WEAK_CONTRAST = 0.02  # .. and as a share of the median of all views, under which there is hardly anything
 
 
 def training_poses(
@@ -112,7 +113,12 @@ def training_source(renderer: Renderer) -> Renderer:
 
 
 def training_views(
-    encoding: Encoding, renderer: Renderer, poses: Float[np.ndarray, "n 3"], progress: Progress = no_progress
+    encoding: Encoding,
+    renderer: Renderer,
+    poses: Float[np.ndarray, "n 3"],
+    progress: Progress = no_progress,
+    *,
+    warn: bool = True,
 ) -> TrainingViews:
     """The encoded views at poses, and the poses of those that are worth learning.
 
@@ -127,26 +133,51 @@ def training_views(
         renderer: Draws the views; see `training_source`.
         poses: Where they are taken.
         progress: Called after each batch.
+        warn: Whether views without contrast, or with hardly any, are a warning.
 
     Raises:
         SettingError: Where no view is left.
     """
-    images, kept, source = [], [], training_source(renderer)
+    images, contrasts, source = [], [], training_source(renderer)
     encoded = encoding.for_eye(renderer.eye)
     encoded.remark_on_overlap()
     with one_torch_thread():
         for start in range(0, len(poses), BATCH):
             part = poses[start : start + BATCH]
             batch = encoded.at(source, part)
-            worth = _contrast(batch, encoded.mask) > MIN_CONTRAST
-            images.append(batch[worth])
-            kept.append(part[worth.numpy()])
+            contrasts.append(_contrast(batch, encoded.mask))
+            images.append(batch[contrasts[-1] > MIN_CONTRAST])
             progress(min(start + BATCH, len(poses)), len(poses))
-    if not sum(map(len, kept)):
+    contrast = torch.cat(contrasts) if contrasts else torch.empty(0)
+    worth = (contrast > MIN_CONTRAST).numpy()
+    if not worth.any():
         raise SettingError(
             f"none of {len(poses)} training views shows anything; choose another route, eye or encoding ({encoding})"
         )
-    return torch.cat(images), np.concatenate(kept)
+    if warn:
+        _warn_of_contrast(encoding, source, poses, contrast)
+    return torch.cat(images), poses[worth]
+
+
+def _warn_of_contrast(
+    encoding: Encoding, source: Renderer, poses: Float[np.ndarray, "n 3"], contrast: Float32[torch.Tensor, " n"]
+) -> None:
+    """Log how many views at poses show nothing, or hardly anything, and which is the first of them."""
+    weak = contrast <= max(MIN_CONTRAST, WEAK_CONTRAST * float(contrast.median()))
+    if not weak.any():
+        return
+    first = int(weak.int().argmax())
+    x, y, _ = poses[first].tolist()
+    where = source.label(poses[first]) if isinstance(source, DatabaseViews) else f"at x {x:.2f} m, y {y:.2f} m"
+    log.warning(
+        "%d of %d training views are constant or nearly so in the encoding '%s' (the first: %s); %d are not learned. Where something "
+        "covers the eye this is right; else choose another --encoding (foreground-mask needs images with transparency)",
+        int(weak.sum()),
+        len(weak),
+        encoding,
+        where,
+        int((contrast <= MIN_CONTRAST).sum()),
+    )
 
 
 def _contrast(images: Images, mask: FeatureMask | None) -> Float32[torch.Tensor, " n"]:

@@ -23,7 +23,7 @@ KEYS = {
         "model", "encoding", "n_views", "n_positions", "median_error_deg", "mean_error_deg", "share_over_45", "seconds",
     },
     "train": {"file", "model", "encoding", "n_views", "memory_bytes", "fit_seconds"},
-    "compare": {"encoding", "n_views", "n_positions", "models"},
+    "compare": {"encoding", "n_views", "n_positions", "n_worlds", "n_walks", "models"},
     "ridf": {"encoding", "n_references", "rotational", "translational", "figure"},
     "catchment": {
         "model", "encoding", "n_positions", "spacing_m", "area_m2", "volume", "reach_m", "descent_within_45", "descent_within_90",

@@ -21,6 +21,7 @@ from tussock.navigation.failures import CATCHMENT, FAR, POOR, Cause, Diagnosis, 
 from tussock.navigation.feature_mask import FeatureMask
 from tussock.navigation.learned_views import LearnedViews
 from tussock.navigation.models import make_model
+from tussock.navigation.models.base import recognises
 from tussock.navigation.models.files import TrainedModel
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.stopping import StoppingRules, StopReason
@@ -240,6 +241,18 @@ def test_a_mirrored_world_gives_the_same_cause(name):
     assert np.isclose(image.recognised, diagnosis.recognised)
     assert np.isclose(image.turning, diagnosis.turning)
     assert abs(abs(image.error) - abs(diagnosis.error)) < 1e-3
+
+
+def test_a_control_that_recognises_nothing_fails_by_chance():
+    """In the rooms where others have a cause: its headings do not depend on what it learned."""
+    poor = [diagnosis for case, _ in CASES.values() if (diagnosis := first_step(case, "random")[1]) is not None]
+    assert len(poor) > len(CASES) / 3
+    assert {(each.cause, each.recognised) for each in poor} == {(Cause.UNEXPLAINED, None)}
+    assert all("off the route's" in str(each) for each in poor)
+    assert any(each.nearest > CATCHMENT for each in poor)
+    told = {name: recognises(make_model(name)) for name in ("random", "opponent-random", "infomax", "opponent-chain")}
+    assert told == {"random": False, "opponent-random": False, "infomax": True, "opponent-chain": True}
+    assert recognises(WithoutMatch())
 
 
 def test_a_good_step_has_no_diagnosis():

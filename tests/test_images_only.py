@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from commands import printed, tussock
 
+from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import key_of, route_key, training_key
 from tussock.navigation.stopping import StopReason
@@ -419,3 +420,18 @@ def test_the_key_of_a_run_depends_on_the_images(copies):
         keys.append([key(experiment) for key in (key_of, route_key, training_key)])
     for of_one_kind in zip(*keys, strict=True):
         assert len(set(of_one_kind)) == 3
+
+
+def test_an_image_in_which_the_encoding_sees_nothing_is_named(drawn, tmp_path, caplog):
+    """One photo without transparency among others: through foreground-mask it is the same everywhere."""
+    shutil.copytree(drawn[0], tmp_path / "route")
+    path = sorted((tmp_path / "route").glob("*.png"))[3]
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    image[..., 3] = 255
+    cv2.imwrite(str(path), image)
+    with open_views(tmp_path / "route") as views, caplog.at_level(logging.WARNING, "tussock.navigation"):
+        _, poses = training_views(Encoding.named("edges"), views, views.training.poses)
+    assert len(poses) == len(views.training.poses) - 1
+    (message,) = [record.message for record in caplog.records if "training views" in record.message]
+    assert str(path) in message
+    assert "foreground-mask" in message

@@ -246,13 +246,31 @@ def test_shares_are_of_all_runs_and_deviations_of_those_that_arrived():
 
 
 def test_the_interval_is_over_worlds_and_not_over_runs():
-    alike = [line(seed=seed, offset=offset, arrived=offset > 0) for seed in range(9) for offset in (0.1, -0.1)]
-    assert interval_over_worlds(alike) == [0.5, 0.5]  # every world has the same share
-    either = [line(seed=seed, offset=offset, arrived=seed % 2 == 0) for seed in range(100) for offset in (0.1, -0.1)]
-    low, high = interval_over_worlds(either)
+    def over(count, arrives):
+        low, high = interval_over_worlds(
+            [
+                line(seed=seed, offset=offset, arrived=arrives(seed, offset))
+                for seed in range(count)
+                for offset in (0.1, -0.1)
+            ]
+        )
+        return low, high
+
+    low, high = over(100, lambda seed, offset: seed % 2 == 0)
     # of a hundred worlds, as a binomial's normal approximation has it; 200 independent runs would give 0.43 and 0.57
     assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)
     assert high == pytest.approx(0.5 + 1.96 * 0.05, abs=0.015)
+    closer, nearer = over(100, lambda seed, offset: offset > 0)  # every world has the same share
+    assert nearer - closer < 0.75 * (high - low)
+
+
+def test_there_is_no_interval_of_few_worlds(tmp_path):
+    lines = [line(seed=seed, offset=offset) for seed in range(4) for offset in (0.1, -0.1)]
+    result = made_up("it", *lines, encoding="panorama")
+    assert result.scores()["totals"]["arrived_share_95"] is None
+    (tmp_path / "it.json").write_text(result.to_json())
+    assert read_result(tmp_path / "it.json") == result
+    assert "| no interval |" in leaderboard([result])
 
 
 # What is refused
@@ -401,11 +419,33 @@ def test_the_best_are_first():
         made_up("half", *half),
         made_up("nearer", line(deviation=0.1), line(deviation=0.2)),
     ]
-    rows = leaderboard(entries).splitlines()
-    assert rows[0] == "| entry | arrived | 95 % | off the route | noise 0 | tiny | memory |"
+    table, against_next = leaderboard(entries).split("\n\n")
+    rows = table.splitlines()
+    assert rows[0] == "| entry | arrived | 95 % (2 runs, 1 world) | off the route | noise 0 | tiny | memory |"
     assert [row.split("`")[1] for row in rows[2:]] == ["nearer", "farther off", "half", "worse"]
-    assert rows[2] == "| `nearer`, `foreground-mask` | 100 % | 100 % to 100 % | 15.0 cm | 100 % | 100 % | 1.5 MB |"
-    assert rows[5] == "| `worse`, `foreground-mask` | 0 % | 0 % to 0 % |  | 0 % | 0 % |  |"
+    assert rows[2] == "| `nearer`, `foreground-mask` | 100 % | no interval | 15.0 cm | 100 % | 100 % | 1.5 MB |"
+    assert rows[5] == "| `worse`, `foreground-mask` | 0 % | no interval |  | 0 % | 0 % |  |"
+    each = [[cell.strip() for cell in row.split("|")[2:-1]] for row in against_next.splitlines()[2:]]
+    name = "`{}`, `foreground-mask`".format
+    assert each[1] == [name("half"), "50 %", "no interval", "1, 0", "–", ""]
+
+
+def test_each_entry_is_tested_against_the_others():
+    """Eight worlds, in which one entry always arrives and two never do: all exchanges but two give a smaller difference."""
+    seeds = range(8)
+    good = made_up("good", *[line(seed=seed) for seed in seeds])
+    bad, worse = (made_up(name, *[line(seed=seed, arrived=False) for seed in seeds]) for name in ("bad", "worse"))
+    *_, first, second = leaderboard([worse, good, bad]).splitlines()
+    cells = [cell.strip() for cell in first.split("|")[1:-1]]
+    assert cells[2:] == [
+        "100 %",
+        cells[3],
+        "8, 0",
+        f"{3 * 2 / 2**8:.2g}",
+        "`bad`, `foreground-mask`, `worse`, `foreground-mask`",
+    ]
+    assert cells[3].endswith("to 100 %")
+    assert [cell.strip() for cell in second.split("|")[3:-1]] == ["0 %", "-34 % to 34 %", "0, 0", "1", ""]
 
 
 def test_results_of_two_versions_are_not_mixed(tmp_path):

@@ -1,22 +1,23 @@
 """Statistics of a sweep's runs, against textbooks and by hand; and its figures and worst walks."""
 
-import tracemalloc
-
 import numpy as np
 import pandas as pd
 import pytest
 
+from tussock.navigation.reports.report import Cell
+from tussock.navigation.reports.results import plain_json
 from tussock.navigation.sweeps.figures import along_axis
 from tussock.navigation.sweeps.statistics import (
     axes_of,
     by_axis,
     choice_label,
-    mean_interval,
     pairings,
     setting_label,
+    summary,
     worlds_of,
 )
 from tussock.navigation.sweeps.store import table_of
+from tussock.navigation.sweeps.tables import pair_table, pairing_numbers
 from tussock.navigation.sweeps.worst import describe_evidence, step_to_show
 
 
@@ -32,24 +33,6 @@ def test_a_figure_has_every_choice():
         along_axis(frame, ["resize"], ["arrived"], [])
 
 
-def test_intervals_are_those_of_the_textbook():
-    """For many independent values, mean +- 1.96 standard errors; where runs share worlds, those of the means of the worlds."""
-    random = np.random.default_rng(0)
-    values = random.normal(3, 2, 2000)
-    interval = mean_interval(values, np.arange(2000))
-    assert np.allclose(
-        [interval.low, interval.high], 3 + np.array([-1.96, 1.96]) * 2 / 2000**0.5 + values.mean() - 3, atol=0.02
-    )
-    worlds = np.repeat(np.arange(40), 50)
-    shared = np.repeat(random.normal(size=40), 50)
-    wide = mean_interval(shared, worlds)
-    assert 0.8 < (wide.high - wide.low) / (2 * 1.96 * shared.std() / 40**0.5) < 1.2
-    assert np.isnan(mean_interval(np.array([]), np.array([], dtype=int)).value)
-    one = mean_interval(np.array([3.0]), np.array([0]))
-    assert one.value == 3
-    assert np.isnan([one.low, one.high]).all()  # undetermined
-
-
 def test_runs_in_one_world_are_one_group():
     rows = [
         {"world": world, "world_seed": seed, "seed": 5, "route": route, "route_seed": route_seed}
@@ -62,48 +45,53 @@ def test_runs_in_one_world_are_one_group():
     assert groups == [0, 0, 0, 0, 1, 1, 2, 3, 2, 3, 2, 3, 4, 4, 4, 4, 4, 4]
 
 
-@pytest.mark.parametrize("shape", ["share", "skewed"])
-def test_the_interval_of_many_groups_is_that_of_the_bootstrap(monkeypatch, shape):
-    """Up to a small part of its width, for groups of different sizes."""
-    random = np.random.default_rng(0)
-    groups = random.integers(0, 1500, 6000)
-    values = random.random(6000) < 0.7 if shape == "share" else random.gamma(2, 0.05, 6000) + 0.1 * (groups % 2)
-    drawn = mean_interval(values.astype(float), groups)
-    monkeypatch.setattr("tussock.navigation.sweeps.statistics.MAX_GROUPS", 1000)
-    normal = mean_interval(values.astype(float), groups)
-    assert normal.value == drawn.value
-    assert normal.low != drawn.low
-    assert np.allclose([normal.low, normal.high], [drawn.low, drawn.high], rtol=0, atol=0.05 * (drawn.high - drawn.low))
-
-
-def test_the_interval_of_a_share_ends_at_one():
-    interval = mean_interval(np.r_[0.0, np.ones(5000)], np.arange(5001))
-    assert interval.low < interval.value < interval.high <= 1
-
-
-def test_many_groups_need_little_memory():
-    tracemalloc.start()
-    mean_interval(np.ones(30_000), np.arange(30_000))
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 2**27
-
-
 def test_models_are_compared_on_runs_that_are_equal_in_everything_else():
     rows = [
-        {"model": model, "offset_m": offset, "world": "w", "world_seed": seed, "route": None, "route_seed": None, "route_length_m": 8.0,
+        {"model": model, "offset_m": offset, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "route_length_m": 8.0,
          "seed": 0, "arrived": model == "good" or offset == 0, "mean_deviation_m": 0.1 if model == "good" else 0.3}
-        for model in ("bad", "good") for offset in (0.0, 0.1) for seed in range(3)
+        for model in ("bad", "good") for offset in (0.0, 0.1) for seed in range(6)
     ]  # fmt: skip
     frame = pd.DataFrame([*rows, rows[0] | {"offset_m": 7.0}])  # this one has no partner
     settings = ["model", "offset_m", "world", "world_seed", "seed"]
     axes = axes_of(frame, settings)
     assert list(axes.values()) == [["model"], ["offset_m"], ["world_seed"]]
     (pair,) = pairings(frame, settings, ["arrived", "mean_deviation_m"], ["model"])
-    assert (pair.first, pair.second, pair.pairs) == ("bad", "good", 6)
-    assert pair.difference["arrived"].value == -0.5
-    assert np.isclose(pair.difference["mean_deviation_m"].value, 0.2)
-    assert (pair.better["arrived"], pair.worse["arrived"], pair.worse["mean_deviation_m"]) == (0, 3, 6)
+    assert (pair.first, pair.second, pair.pairs, pair.worlds) == ("bad", "good", 12, 6)
+    arrived, deviation = pair.differences["arrived"], pair.differences["mean_deviation_m"]
+    assert arrived.interval.value == -0.5
+    assert arrived.interval.low < -0.5 < arrived.interval.high
+    assert np.isclose(deviation.interval.value, 0.2)
+    assert np.isnan(deviation.interval.low)  # it is the same in all worlds
+    assert (arrived.better, arrived.worse, arrived.effect) == (0, 6, -0.5)
+    assert (deviation.better, deviation.worse, deviation.effect) == (0, 12, -1)
+    assert arrived.p == deviation.p == arrived.corrected_p == 2 / 2**6  # all worlds point one way
+
+
+def test_p_values_are_corrected_for_all_pairs():
+    """Of three models, two of which are alike."""
+    rows = [
+        {"model": model, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "seed": 0, "arrived": model != "c"}
+        for model in "abc" for seed in range(8)
+    ]  # fmt: skip
+    pairs = pairings(pd.DataFrame(rows), ["model", "world_seed"], ["arrived"], ["model"])
+    found = {pair.first + pair.second: pair.differences["arrived"] for pair in pairs}
+    assert {name: each.p for name, each in found.items()} == {"ab": 1, "ac": 2 / 2**8, "bc": 2 / 2**8}
+    assert {name: each.corrected_p for name, each in found.items()} == {"ab": 1, "ac": 6 / 2**8, "bc": 6 / 2**8}
+
+
+def test_there_is_no_interval_and_no_test_with_too_few_worlds():
+    rows = [
+        {"model": model, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "seed": run, "arrived": run < 3}
+        for model in "ab" for seed in range(4) for run in range(5)
+    ]  # fmt: skip
+    frame = pd.DataFrame(rows)
+    both = summary(frame, ["arrived"])
+    assert (both.runs, both.worlds, both.intervals["arrived"].value) == (40, 4, 0.6)
+    assert np.isnan(both.intervals["arrived"].low)
+    (pair,) = pairings(frame, ["model", "world_seed", "seed"], ["arrived"], ["model"])
+    assert np.isnan([pair.differences["arrived"].p, pair.differences["arrived"].interval.low]).all()
+    table = pair_table([plain_json(pairing_numbers(pair))], ["arrived"])
+    assert table.rows[0][:4] == ["a", "b", "20", Cell(text="4", note="no interval")]
 
 
 @pytest.mark.parametrize(
@@ -157,3 +145,6 @@ def test_evidence_is_that_of_the_step():
     assert describe_evidence(steps.iloc[0]) is None
     assert "2.50 m" in str(describe_evidence(steps.iloc[2]))
     assert "60 degrees" in str(describe_evidence(steps.iloc[3]))
+    chance = steps.iloc[2].copy()  # of a control that recognises nothing, far from all learned views
+    chance["cause"], chance["nearest_view_m"] = "unexplained", 3.0
+    assert str(describe_evidence(chance)).startswith("unexplained, the heading is 90 degrees")

@@ -320,13 +320,42 @@ class Blinking:
     def __exit__(self, kind, error, at): ...
 
 
-def test_views_that_show_nothing_are_not_learned(renderer):
+def test_views_that_show_nothing_are_not_learned(renderer, caplog):
     poses = random_poses(6) * 0.2 + [1.5, 1.5, 0]
     trained = train(PerfectMemory(), ENCODING, Blinking(renderer, slice(1, None, 2)), poses)
     assert np.array_equal(trained.poses, poses[::2])
     assert len(trained.model.snapshots) == 3
+    (record,) = caplog.records  # once, not once for each view
+    x, y = poses[1, :2]
+    for text in (
+        "3 of 6 training views",
+        f"'{ENCODING}'",
+        f"x {x:.2f} m, y {y:.2f} m",
+        "3 are not learned",
+        "--encoding",
+    ):
+        assert text in record.message
     with pytest.raises(InputError, match="none of 6 training views shows anything"):
         train(PerfectMemory(), ENCODING, Blinking(renderer, slice(None)), poses)
+
+
+def test_views_that_show_hardly_anything_are_learned_with_a_warning(renderer, caplog):
+    """Without normalising, a view that is nearly constant lies near to every other one."""
+
+    class Dim(Blinking):
+        def render(self, poses):
+            views = self.renderer.render(poses)
+            views[self.blind, ..., :3] = 100 + views[self.blind, ..., :3] // 64
+            return views
+
+    grey, poses = Encoding.parse("grey | resize 2"), random_poses(6) * 0.2 + [1.5, 1.5, 0]
+    assert len(train(PerfectMemory(), grey, Dim(renderer, slice(2, 3)), poses).model.snapshots) == 6
+    (record,) = caplog.records
+    assert "1 of 6 training views" in record.message
+    assert "0 are not learned" in record.message
+    caplog.clear()
+    train(PerfectMemory(), grey, renderer, poses)
+    assert not caplog.records
 
 
 def test_a_trajectory_is_its_steps(renderer, route, memory, tmp_path):

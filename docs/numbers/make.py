@@ -9,7 +9,8 @@ Each is recorded in records/NAME.json: its values, and the command, commit, proc
 
     <!-- number: NAME.PART -->1.1 cm<!-- end of number -->
 
-between which the record's text stands; between `<!-- numbers: origin -->` and `<!-- end of numbers -->` stands where the numbers of a page come from.
+between which the record's text stands. Between `<!-- numbers: origin -->` and `<!-- end of numbers -->` stands where the numbers of
+a page come from.
 """
 
 import argparse
@@ -87,7 +88,10 @@ def written(page: str, kept: Mapping[str, Record]) -> str:
     lines = [
         "| numbers | command | commit | processor | day |",
         "|---|---|---|---|---|",
-        *(f"| {name} | {{command}} | {{commit}} | {{processor}} | {{day}} |".format(**kept[name]["origin"]) for name in names),
+        *(
+            f"| {name} | {{command}} | {{commit}} | {{processor}} | {{day}} |".format(**kept[name]["origin"])
+            for name in names
+        ),
     ]
     origin = "\n".join(lines) + "\n"
     return ORIGIN.sub(lambda mark: mark[1] + origin + mark[3], NUMBER.sub(number, page))

@@ -51,7 +51,10 @@ def tussock(folder: Path, *arguments: object) -> Values:
 
 def sweep(folder: Path, name: str, fixed: Mapping[str, Any], axes: Mapping[str, Any]) -> pd.DataFrame:
     """The table of the runs of a sweep, one row a run."""
-    lines = [f"[{part}]\n" + "".join(f"{key} = {toml(value)}\n" for key, value in table.items()) for part, table in (("fixed", fixed), ("axes", axes))]
+    lines = [
+        f"[{part}]\n" + "".join(f"{key} = {toml(value)}\n" for key, value in table.items())
+        for part, table in (("fixed", fixed), ("axes", axes))
+    ]
     (folder / f"{name}.toml").write_text("\n".join(lines))
     tussock(folder, "sweep", f"{name}.toml", "--out", name)
     table = pd.read_parquet(folder / name / "runs.parquet")

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import llvmlite.binding
 import numpy as np
+from jaxtyping import Float, Int
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, InputError, SettingError
@@ -19,7 +20,7 @@ from tussock.world.settings import number, settings, switch, text, whole
 from ..encoding import Encoding
 from ..experiment import Experiment
 from ..experiment_settings import settings_of
-from ..sweeps.statistics import mean_interval
+from ..intervals import share_interval
 from .definition import BENCHMARKS, Benchmark
 
 PANORAMA = "panorama"  # the encoding of entries that get the view as it is
@@ -137,12 +138,16 @@ def score(runs: Sequence[Line]) -> dict[str, Any]:
     }
 
 
-def interval_over_worlds(runs: Sequence[Line]) -> list[float]:
-    """The 95 % interval of the share that arrives, over sets of as many worlds drawn with replacement from these."""
+def interval_over_worlds(runs: Sequence[Line]) -> list[float] | None:
+    """The 95 % interval of the share that arrives, over worlds; None where there are too few of these."""
+    interval = share_interval(*arrivals(runs))
+    return None if np.isnan(interval.low) else [round(interval.low, 9), round(interval.high, 9)]
+
+
+def arrivals(runs: Sequence[Line]) -> tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Which runs arrived (1, else 0), and the number of each run's world."""
     worlds = {world: k for k, world in enumerate(dict.fromkeys((run.world, run.seed) for run in runs))}
-    groups = np.array([worlds[run.world, run.seed] for run in runs])
-    interval = mean_interval(np.array([float(run.arrived) for run in runs]), groups)
-    return [round(interval.low, 9), round(interval.high, 9)]
+    return np.array([float(run.arrived) for run in runs]), np.array([worlds[run.world, run.seed] for run in runs])
 
 
 def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:

@@ -156,11 +156,16 @@ class CompareCommand(LearningOptions):
             ):
                 rows[name] = dataclasses.asdict(row)
                 report(len(rows), len(specs))
+        message(
+            "1 world, and 1 walk of each model: no intervals and no tests; a sweep over world-seed gives both (docs/sweeps.md)"
+        )
         on_route = experiment.replace(training__learning_walk=0.0)
         return {
             "encoding": str(experiment.encoding),
             "n_views": len(on_route.training_poses(world, route)),
             "n_positions": len(positions),
+            "n_worlds": 1,
+            "n_walks": 1,
             "models": rows,
         }
 

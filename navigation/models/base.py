@@ -99,6 +99,11 @@ def memory_bytes(model: FamiliarityModel) -> int | None:
     return None if size is None else int(size)
 
 
+def recognises(model: FamiliarityModel) -> bool:
+    """Whether the familiarity of any model depends on the learned views; True where the model does not say."""
+    return bool(getattr(model, "recognises", True))
+
+
 @dataclass_transform(kw_only_default=True, eq_default=False, field_specifiers=(attrs.field,))
 def model(cls: type[T]) -> type[T]:
     """Class decorator: a model whose parameters are fields (see `tussock.world.settings`), checked when made and when changed."""
@@ -120,6 +125,7 @@ class Model(ABC):
         dtypes: Of learned tensors that are not float32; None means any.
         takes_mask: Whether the class minds `mask`, as those of tussock do.
         takes_partial: Whether views may be unknown in part (`FeatureMask.partial`): nan in views, and in what is learned.
+        recognises: Whether familiarity depends on the learned views; see the function of this name.
     """
 
     name = "model"
@@ -128,6 +134,7 @@ class Model(ABC):
     dtypes: ClassVar[Mapping[str, torch.dtype | None]] = {}
     takes_mask: ClassVar[bool] = False
     takes_partial: ClassVar[bool] = False
+    recognises: ClassVar[bool] = True
 
     device: str = instance_of(str, "cpu", "the name of a device")
     seed: int = whole(0, low=0)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import torch
 
 from ..feature_mask import FeatureMask, seeing
-from .base import FamiliarityModel, Images, Learned, Model, Scans, Shapes, memory_bytes
+from .base import FamiliarityModel, Images, Learned, Model, Scans, Shapes, memory_bytes, recognises
 from .incremental import IncrementalModel
 
 OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
@@ -56,6 +56,11 @@ class Opponent(Model):
     def takes_mask(self) -> bool:  # type: ignore[override]
         """Whether the model minds `mask`."""
         return self.attractive.takes_mask
+
+    @property
+    def recognises(self) -> bool:  # type: ignore[override]
+        """Whether the model recognises views."""
+        return self.attractive.recognises
 
     def see(self: Memories, mask: FeatureMask | None) -> Memories:
         """Both memories see through the same mask."""
@@ -116,6 +121,11 @@ class OutsideOpponent:
     def scan(self, views: Images) -> Scans:
         """Familiarity of each rotation, of the attractive memory less that of the repulsive one."""
         return self.attractive.scan(views) - self.repulsive.scan(views)
+
+    @property
+    def recognises(self) -> bool:
+        """Whether the model recognises views."""
+        return recognises(self.attractive)
 
     @property
     def memory_bytes(self) -> int | None:

@@ -19,6 +19,7 @@ class RandomHeadings(Model):
     name = "random"
     paper = "Ardin et al. 2016"
     takes_mask = True
+    recognises = False
     dtypes = {"rows": torch.int64, "columns": torch.int64}  # noqa: RUF012
 
     def _learn(self, views: Images) -> Learned:

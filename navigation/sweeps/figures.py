@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from tussock.world.geometry import Route
 from tussock.world.scene import World
 
+from ..intervals import Interval
 from ..reports.drawing import (
     CURVE_COLOUR,
     GOOD_COLOUR,
@@ -21,7 +22,7 @@ from ..reports.drawing import (
     legend_above,
 )
 from ..reports.maps import draw_map, draw_route, map_axes
-from .statistics import MEASURES, Interval, axis_label, by_axis, choice_label
+from .statistics import MEASURES, axis_label, by_axis, choice_label
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)
 MAX_LABELS = 24  # an axis with more choices has no labels
@@ -57,7 +58,7 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
     for number, (label, part) in enumerate(lines):
         # Lines are shifted, so that their intervals do not cover each other.
         shift = (0.3 if numeric else 0.6) * room * ((number + 0.5) / len(lines) - 0.5)
-        intervals = {choice: values for choice, (_, values) in by_axis(part, axis, measures).items()}
+        intervals = {choice: each.intervals for choice, each in by_axis(part, axis, measures).items()}
         known = [k for k, choice in enumerate(labels) if choice in intervals]
         for measure, panel in panels.items():
             values = [intervals[labels[k]][measure] for k in known]

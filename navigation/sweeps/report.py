@@ -1,6 +1,5 @@
 """The report of a sweep: success and error by axis, models in pairs, causes of failures, and the worst walks."""
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -11,40 +10,32 @@ from tussock.world.progress import Progress, no_progress
 
 from ..experiment_settings import TYPES, default_settings
 from ..failures import Cause
-from ..reports.page import format_value
-from ..reports.report import REPORT, Block, Cell, Command, Drawing, Report, Section, Table, Text, write_report
+from ..reports.report import REPORT, Block, Command, Drawing, Report, Section, Table, Text, write_report
 from ..reports.report import RESULTS as REPLICATION_RESULTS
 from ..reports.results import plain_json
 from .figures import along_axis
 from .statistics import (
     MAX_CHOICES,
-    MEASURES,
-    Interval,
     axes_of,
+    axis_label,
     by_axis,
     choice_label,
-    means,
+    measures_of,
     pairings,
     ranges_of,
     setting_label,
+    summary,
+    worlds_of,
 )
 from .store import TABLE, Store, read_steps, read_title
 from .sweep import worst_of
+from .tables import INTERVALS, PAIRS, pair_table, pairing_numbers, summary_numbers, summary_table
 from .worst import walk_section
 
 RESULTS = "report.json"
 MAX_ERRORS = 100  # on the page
 MAX_IN_HEADLINE = 8  # choices
 LEAD = "Success and errors of all runs, and why the worst of them failed."
-INTERVALS = (
-    "Numbers in parentheses are 95 % bootstrap confidence intervals of the mean. Runs in one world are not independent, so whole worlds "
-    "are drawn, with all of their runs; in a world from a file, whole routes. Where there is only one of these, single runs are drawn. "
-    "For more than 2,000 of them, the intervals are those of a normal distribution."
-)
-PAIRS = (
-    "Pairs, compared on the runs that are equal in everything else. A difference is the first minus the second; it is bold where its "
-    "interval does not contain 0."
-)
 IN_RANGES = f"There are more than {MAX_CHOICES} choices. Each value is of a range of successive ones; the single runs are in {TABLE}."
 FAILED = "Walks that did not arrive or were put back, by the cause that the evidence of their poor steps supports."
 WALKS = (
@@ -84,7 +75,7 @@ def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_
         raise FileError(f"no run in {folder} could be completed; the first: {table['error'].iloc[0]}")
     axes = axes_of(completed, list(TYPES))
     completed = completed.assign(**_ranges(completed, axes))
-    measures = [name for name in MEASURES if name != "resets" or completed["resets"].to_numpy().any()]
+    measures = measures_of(completed)
     results = plain_json(_results(table, completed, axes, measures, shown))
     report = Report(
         title=read_title(folder) or f"Sweep {folder.resolve().name}",
@@ -107,18 +98,17 @@ def _results(
     failed = completed[~completed["arrived"].astype(bool) | (completed["resets"] > 0)]
     groups = failed.groupby(by, dropna=False) if by else [("all", failed)]
     not_run = table[table["error"].notna()]
+    overall = summary_numbers(summary(completed, measures))
     return {
         "version": 1,
         "runs": len(table),
-        "measures": _numbers(means(completed, measures)),
+        "worlds": overall["worlds"],
+        "measures": {measure: overall[measure] for measure in measures},
         "by": {
-            label: {
-                choice: {"runs": count, **_numbers(intervals)}
-                for choice, (count, intervals) in by_axis(completed, _columns(completed, axes, label), measures).items()
-            }
+            label: _along(completed, _columns(completed, axes, label), [] if axes[label] == by else by, measures)
             for label in axes
         },
-        "pairs": [dataclasses.asdict(pair) for pair in (pairings(completed, list(TYPES), measures, by) if by else [])],
+        "pairs": [pairing_numbers(pair) for pair in (pairings(completed, list(TYPES), measures, by) if by else [])],
         "causes": {
             choice_label(key): {cause: int((part["cause"] == cause).sum()) for cause in Cause} for key, part in groups
         },
@@ -171,8 +161,13 @@ def _arrived(runs: pd.DataFrame) -> str:
     return f"{int(runs['arrived'].sum())} of {len(runs)}"
 
 
-def _numbers(intervals: dict[str, Interval]) -> dict[str, Any]:
-    return {measure: dataclasses.asdict(interval) for measure, interval in intervals.items()}
+def _along(completed: pd.DataFrame, axis: list[str], by: list[str], measures: list[str]) -> dict[str, Any]:
+    """The runs of each choice of an axis in numbers; where `by` has settings, also split by their choices, as the figure is."""
+    numbers = {choice: summary_numbers(each) for choice, each in by_axis(completed, axis, measures).items()}
+    for key, part in completed.groupby(by, dropna=False, sort=True) if by else ():
+        for choice, each in by_axis(part, axis, measures).items():
+            numbers[choice].setdefault("split", {})[choice_label(key)] = summary_numbers(each)
+    return numbers
 
 
 def _about(table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[str]]) -> dict[str, Any]:
@@ -189,6 +184,7 @@ def _about(table: pd.DataFrame, completed: pd.DataFrame, axes: dict[str, list[st
     count = "all" if len(completed) == len(table) else str(len(completed))
     return {
         "Runs": f"{len(table)} runs, {count} completed",
+        "Worlds": str(len(set(worlds_of(completed)))),
         "Varied": "; ".join(choices) or "nothing",
         "Equal in all runs": "; ".join(equal) or "everything has its default",
     }
@@ -205,7 +201,8 @@ def _blocks(
     blocks: list[Block] = [Text(INTERVALS, style="soft")]
     blocks += [_axis(completed, label, axes, measures, results["by"][label]) for label in axes]
     if results["pairs"]:
-        blocks.append(_pairs(results["pairs"], measures))
+        pairs = [Text(PAIRS, style="soft"), pair_table(results["pairs"], measures)]
+        blocks.append(Section(title="In pairs", anchor="pairs", blocks=pairs))
     causes = Table(
         columns=["", *Cause],
         rows=[[label, *map(str, counts.values())] for label, counts in results["causes"].items()]
@@ -235,34 +232,8 @@ def _axis(
     drawing = Drawing(
         names=(anchor,), draw=lambda: [along_axis(completed, columns, measures, lines)], alt=f"Means by {label}"
     )
-    table = Table(
-        columns=[label, "runs", *(MEASURES[measure] for measure in measures)],
-        rows=[
-            [choice, str(numbers["runs"]), *(_cell(numbers[measure]) for measure in measures)]
-            for choice, numbers in choices.items()
-        ],
-    )
+    rows = {
+        (choice, line): numbers for choice, each in choices.items() for line, numbers in each.get("split", {}).items()
+    } or {(choice,): each for choice, each in choices.items()}
+    table = summary_table(rows, [label, axis_label(by)] if lines else [label], measures)
     return Section(title=f"By {label}", anchor=anchor, blocks=[drawing, *[note] * (columns != names), table])
-
-
-def _pairs(pairs: list[dict[str, Any]], measures: list[str]) -> Section:
-    """The choices of an axis in pairs."""
-    columns = ["first", "second", "pairs"]
-    for measure in measures:
-        columns += [MEASURES[measure], "better, worse"]
-    rows = []
-    for pair in pairs:
-        cells: list[str | Cell] = [pair["first"], pair["second"], str(pair["pairs"])]
-        for measure in measures:
-            difference = pair["difference"][measure]
-            apart = difference["low"] is not None and (difference["low"] > 0 or difference["high"] < 0)
-            cells += [_cell(difference, bold=apart), f"{pair['better'][measure]}, {pair['worse'][measure]}"]
-        rows.append(cells)
-    return Section(title="In pairs", anchor="pairs", blocks=[Text(PAIRS), Table(columns=columns, rows=rows)])
-
-
-def _cell(interval: dict[str, float | None], *, bold: bool = False) -> Cell:
-    """A mean with its interval."""
-    low, high = interval["low"], interval["high"]
-    note = "" if low is None else f"({format_value(low)} to {format_value(high)})"
-    return Cell(text=format_value(interval["value"]), note=note, bold=bold)

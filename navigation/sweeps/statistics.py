@@ -1,10 +1,8 @@
-"""Statistics of a sweep's runs: means with bootstrap confidence intervals, by axis, and differences between models."""
+"""Statistics of a sweep's runs: means with confidence intervals, by axis, and tests of models in pairs (docs/statistics.md)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from itertools import combinations
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -13,29 +11,56 @@ from jaxtyping import Float, Int
 
 from tussock.world.params import is_generated
 
-SAMPLES = 4000  # of a bootstrap
-CONFIDENCE = 0.95
+from ..intervals import Interval, mean_interval, positive_interval, share_difference_interval, share_interval
+from ..significance import holm, sign_flip_p
+
 MEASURES = {  # columns of the table of runs, with their labels
     "arrived": "share that arrived",
     "mean_deviation_m": "mean deviation from the route (m)",
     "mean_error_deg": "mean heading error (°)",
     "resets": "times put back on the route",
 }
-HIGHER_IS_BETTER = ("arrived",)
+SHARES = ("arrived",)  # the more the better; of the other measures, the less
 UNITS = {"m": "m", "deg": "°"}
 AXIS_ORDER = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # other axes are 1
-MAX_GROUPS = 2000  # of a bootstrap; with more, it differs from a normal distribution about as much as from itself with another seed
 MAX_CHOICES = 200  # of an axis in a report; more are put together
 RANGES = 20  # that choices are put together in
 
 
-@dataclass(frozen=True)
-class Interval:
-    """A mean, and the ends of its confidence interval."""
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """Several runs in numbers.
 
-    value: float
-    low: float
-    high: float
+    Attributes:
+        runs: Number of runs.
+        worlds: Number of worlds that they are in (see `worlds_of`).
+        intervals: Mean and interval, by measure.
+    """
+
+    runs: int
+    worlds: int
+    intervals: dict[str, Interval]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """Two choices compared by one measure.
+
+    Attributes:
+        interval: Mean of the first minus the second.
+        better: Number of pairs in which the first is better.
+        worse: Number of pairs in which the first is worse.
+        effect: Effect size: share of the pairs in which the first is better, less that in which it is worse (-1 to 1).
+        p: p value of "the two are alike" (see `sign_flip_p`); nan with too few worlds.
+        corrected_p: The same after Holm's correction for all pairs that are compared.
+    """
+
+    interval: Interval
+    better: int
+    worse: int
+    effect: float
+    p: float
+    corrected_p: float = np.nan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,52 +71,15 @@ class Pairing:
         first: Label of the first choice.
         second: Label of the second choice.
         pairs: Number of pairs.
-        difference: Mean of the first minus the second, by measure.
-        better: Number of pairs in which the first is better, by measure.
-        worse: Number of pairs in which the first is worse, by measure.
+        worlds: Number of worlds that they are in.
+        differences: The results, by measure.
     """
 
     first: str
     second: str
     pairs: int
-    difference: dict[str, Interval]
-    better: dict[str, int]
-    worse: dict[str, int]
-
-
-def mean_interval(values: Float[np.ndarray, " n"], groups: Int[np.ndarray, " n"]) -> Interval:
-    """Mean of values and its percentile bootstrap interval. Whole groups are drawn, as runs in one world are not independent.
-
-    For more than MAX_GROUPS groups, it is the interval of a normal distribution.
-
-    Args:
-        values: The values.
-        groups: Number of each value's group. For a single group, single values are drawn.
-
-    Returns:
-        The interval; nan for what is undetermined: the mean of no values, and the interval of fewer than two.
-    """
-    if len(values) < 2:
-        return Interval(float(values.sum()) if len(values) else np.nan, np.nan, np.nan)
-    if len(np.unique(groups)) == 1:
-        groups = np.arange(len(values))
-    _, number = np.unique(groups, return_inverse=True)
-    sums, counts, value = np.bincount(number, weights=values), np.bincount(number), float(values.mean())
-    if len(sums) > MAX_GROUPS:
-        error = np.linalg.norm(sums - value * counts) / len(values)
-        ends = value + error * NormalDist().inv_cdf((1 + CONFIDENCE) / 2) * np.array([-1, 1])
-        low, high = ends.clip(values.min(), values.max())  # as those of samples
-    else:
-        drawn = _draws(len(sums))
-        low, high = np.quantile((drawn @ sums) / (drawn @ counts), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Interval(value, float(low), float(high))
-
-
-@lru_cache(maxsize=2)  # of 64 MB at most; measures and choices have the same
-def _draws(groups: int) -> Float[np.ndarray, "samples groups"]:
-    """How often each group is in each sample of a bootstrap."""
-    rng = np.random.default_rng(0)
-    return rng.multinomial(groups, np.full(groups, 1 / groups), size=SAMPLES).astype(float)
+    worlds: int
+    differences: dict[str, Difference]
 
 
 def worlds_of(table: pd.DataFrame) -> Int[np.ndarray, " n"]:
@@ -143,23 +131,32 @@ def choice_label(key: object) -> str:
     )
 
 
-def means(table: pd.DataFrame, measures: Sequence[str]) -> dict[str, Interval]:
-    """Mean and interval of each measure over runs."""
-    return _means(table, measures, worlds_of(table))
+def measures_of(table: pd.DataFrame) -> list[str]:
+    """The measures that a report of runs shows; resets only where there were any."""
+    return [name for name in MEASURES if name != "resets" or table["resets"].to_numpy().any()]
 
 
-def _means(table: pd.DataFrame, measures: Sequence[str], groups: Int[np.ndarray, " n"]) -> dict[str, Interval]:
-    return {measure: mean_interval(table[measure].to_numpy(dtype=float), groups) for measure in measures}
+def summary(table: pd.DataFrame, measures: Sequence[str]) -> Summary:
+    """Runs in numbers, with the mean and interval of each measure."""
+    return _summary(table, measures, worlds_of(table))
 
 
-def by_axis(
-    table: pd.DataFrame, names: list[str], measures: Sequence[str]
-) -> dict[str, tuple[int, dict[str, Interval]]]:
-    """Number of runs, and `means`, for each choice of an axis, in order."""
-    groups, results = worlds_of(table), {}
+def _summary(table: pd.DataFrame, measures: Sequence[str], worlds: Int[np.ndarray, " n"]) -> Summary:
+    intervals = {measure: _interval(measure, table[measure].to_numpy(dtype=float), worlds) for measure in measures}
+    return Summary(runs=len(table), worlds=len(np.unique(worlds)), intervals=intervals)
+
+
+def _interval(measure: str, values: Float[np.ndarray, " n"], worlds: Int[np.ndarray, " n"]) -> Interval:
+    known = np.isfinite(values)
+    find = share_interval if measure in SHARES else positive_interval
+    return find(values[known], worlds[known])
+
+
+def by_axis(table: pd.DataFrame, names: list[str], measures: Sequence[str]) -> dict[str, Summary]:
+    """`summary` of the runs of each choice of an axis, in order."""
+    worlds, results = worlds_of(table), {}
     for key, part in table.reset_index(drop=True).groupby(names, dropna=False, sort=True, observed=True):
-        of_choice, _ = pd.factorize(groups[part.index])  # in the order in which they appear there
-        results[choice_label(key)] = len(part), _means(part, measures, of_choice)
+        results[choice_label(key)] = _summary(part, measures, worlds[part.index])
     return results
 
 
@@ -185,14 +182,40 @@ def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[st
         both = parts[first].merge(parts[second], on=rest, suffixes=("", "_other"), validate="one_to_one")
         if both.empty:
             continue
-        groups, difference, better, worse = worlds_of(both), {}, {}, {}
-        for measure in measures:
-            values = both[measure].to_numpy(dtype=float) - both[f"{measure}_other"].to_numpy(dtype=float)
-            gain = values if measure in HIGHER_IS_BETTER else -values
-            difference[measure] = mean_interval(values, groups)
-            better[measure], worse[measure] = int((gain > 0).sum()), int((gain < 0).sum())
-        pairing = Pairing(
-            first=first, second=second, pairs=len(both), difference=difference, better=better, worse=worse
+        worlds = worlds_of(both)
+        differences = {measure: _difference(both, measure, worlds) for measure in measures}
+        number = len(np.unique(worlds))
+        results.append(Pairing(first=first, second=second, pairs=len(both), worlds=number, differences=differences))
+    return _corrected(results, measures)
+
+
+def _difference(both: pd.DataFrame, measure: str, worlds: Int[np.ndarray, " n"]) -> Difference:
+    """The first of two choices less the second, from a table of the pairs."""
+    first, second = (both[name].to_numpy(dtype=float) for name in (measure, f"{measure}_other"))
+    known = np.isfinite(first) & np.isfinite(second)
+    first, second, worlds = first[known], second[known], worlds[known]
+    gain = first - second if measure in SHARES else second - first
+    better, worse = int((gain > 0).sum()), int((gain < 0).sum())
+    return Difference(
+        interval=share_difference_interval(first, second, worlds)
+        if measure in SHARES
+        else mean_interval(first - second, worlds),
+        better=better,
+        worse=worse,
+        effect=(better - worse) / max(1, len(gain)),
+        p=sign_flip_p(first - second, worlds),
+    )
+
+
+def _corrected(results: list[Pairing], measures: Sequence[str]) -> list[Pairing]:
+    """Pairings with Holm's correction over all of them, for each measure."""
+    corrected = {measure: holm([each.differences[measure].p for each in results]) for measure in measures}
+    return [
+        replace(
+            each,
+            differences={
+                name: replace(found, corrected_p=corrected[name][k]) for name, found in each.differences.items()
+            },
         )
-        results.append(pairing)
-    return results
+        for k, each in enumerate(results)
+    ]

@@ -16,7 +16,7 @@ from tussock.world.specs import Spec
 
 from ..experiment import Experiment
 from ..experiment_settings import TYPES, experiment_of
-from ..failures import Diagnosis
+from ..failures import Cause, Diagnosis
 from ..reports.report import Command, Drawing, Section
 from ..training import training_source, training_views
 from .figures import view_and_match, walk_map
@@ -74,7 +74,7 @@ def learned_pose(
         some = poses[count : count + number + 1 - len(learned)]  # no more views are drawn than it takes
         count += len(some)
         with suppress(SettingError):  # none of these was learned
-            learned = np.concatenate([learned, training_views(experiment.encoding, renderer, some)[1]])
+            learned = np.concatenate([learned, training_views(experiment.encoding, renderer, some, warn=False)[1]])
     return learned[[number]]
 
 
@@ -91,9 +91,15 @@ def describe_evidence(step: pd.Series) -> str | None:
         return None
     error, turning = (float(np.radians(known[name])) for name in ("error_deg", "turning_deg"))
     nearest, recognised = known.get("nearest_view_m"), known.get("recognised_view_m")
-    return str(
-        Diagnosis(covered=known.get("covered"), nearest=nearest, recognised=recognised, error=error, turning=turning)
+    diagnosis = Diagnosis(
+        covered=known.get("covered"),
+        nearest=nearest,
+        recognised=recognised,
+        error=error,
+        turning=turning,
+        recognises=known["cause"] != Cause.UNEXPLAINED,  # so that a cause that was not given is not found here
     )
+    return str(diagnosis)
 
 
 def _describe(row: dict[str, Any]) -> str:

@@ -127,6 +127,12 @@ class DatabaseViews:
         """The row in `self.poses` of the entry that is nearest to each pose, and how far away it is (m)."""
         return self._entries.nearest(as_poses(poses))
 
+    def label(self, pose: Float[np.ndarray, "3"]) -> str:
+        """The image that is seen at a pose, for messages."""
+        (row,), _ = self._entries.nearest(as_poses(pose[None]))
+        database = self._entries.databases[self._entries.owners[row]]
+        return f"{database.folder / database.label(int(self._entries.rows[row]))}"
+
     def render(self, poses: Poses) -> UInt8[np.ndarray, "n height width channels"]:
         """The views at poses.
 

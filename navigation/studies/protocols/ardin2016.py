@@ -158,7 +158,7 @@ ITEMS = (
         "errors",
         "Errors against displacement",
         "walks",
-        "Mean errors per walk; bars are standard errors of the mean.",
+        "Mean errors per walk; bars are 95 % intervals over routes, from five routes on.",
         lambda walks: lines_by_model(
             walks, "displacement_cm", "errors", "displacement of the start (cm)", "errors per walk"
         ),

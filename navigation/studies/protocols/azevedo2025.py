@@ -125,7 +125,7 @@ ITEMS = (
         "displacement",
         "Displacement against that of the start",
         "walks",
-        "Mean distance from the route, over all worlds and both sides; bars are standard errors of the mean.",
+        "Mean distance from the route, over all worlds and both sides; bars are 95 % intervals over routes, from five routes on.",
         lambda walks: _displacements(walks, "displacement_m"),
     ),
     Item(

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from ...intervals import positive_interval
 from ...reports.drawing import (
     CURVE_COLOUR,
     GOOD_COLOUR,
@@ -23,12 +24,12 @@ MARKERS = "osD^vPX"  # seven, so that 35 models look different in five colours
 
 
 def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str, *, diagonal: bool = False) -> Figure:
-    """The mean of one column against another, one line per model, with standard errors.
+    """The mean of one column against another, one line per model, with intervals over routes.
 
     Args:
-        walks: One walk per row, with a column "model".
+        walks: One walk per row, with the columns "model" and "place".
         x: Column of the horizontal axis.
-        y: Column of the vertical axis.
+        y: Column of the vertical axis, which is never negative.
         xlabel: Label of the horizontal axis.
         ylabel: Label of the vertical axis.
         diagonal: Also draw where x equals y, which are then in one unit.
@@ -39,10 +40,11 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
     figure, axes = canvas((7.2, 3.4))
     axis = axes[0, 0]
     for model, colour, marker in zip(models_in(walks), cycle(COLOURS), cycle(MARKERS), strict=False):
-        grouped = walks[walks["model"] == model].groupby(x)[y]
-        mean, error = grouped.mean().astype(float), grouped.sem().fillna(0).astype(float)
+        grouped = walks[(walks["model"] == model) & walks[y].notna()].groupby(x)
+        found = {at: positive_interval(each[y].to_numpy(float), pd.factorize(each["place"])[0]) for at, each in grouped}
+        mean, low, high = np.array([(each.value, each.low, each.high) for each in found.values()]).reshape(-1, 3).T
         style = {"fmt": f"-{marker}", "color": colour, "label": model}
-        axis.errorbar(mean.index.to_numpy(float), mean, yerr=error, ms=5, lw=1.6, capsize=2, **style)
+        axis.errorbar(list(found), mean, yerr=[mean - low, high - mean], ms=5, lw=1.6, capsize=2, **style)
     if diagonal:
         ends = np.array([0.0, walks[x].max()])
         axis.plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")

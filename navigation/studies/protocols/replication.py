@@ -30,6 +30,7 @@ from ...sweeps.report import arrivals
 from ...sweeps.spec import Sweep
 from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
+from ...sweeps.tables import compared_models, comparison_blocks
 from .protocol import Item, Protocol, check_models, route_names
 
 SUMMARY = (
@@ -70,9 +71,12 @@ def replicate(
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
     outcomes = check_claims(protocol.claims, [results], few_units=False)
+    compared = compared_models(walks)
     parts = [*[count_outcomes(outcomes)] * bool(outcomes), arrivals(walks, ["model"])]
     headline = "; ".join(parts) + "."
-    report = _report(protocol, results, outcomes, about=about, left_out=left_out, command=command, headline=headline)
+    report = _report(
+        protocol, results, outcomes, compared, about=about, left_out=left_out, command=command, headline=headline
+    )
     write_report(report, out)
     return {
         "report": str(out / REPORT),
@@ -94,8 +98,8 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
         out: The folder.
 
     Returns:
-        One row per walk, ordered by model, with the columns of the protocol's `of_walk`; and the number of runs that could not be
-        made, by the reason.
+        One row per walk, ordered by model, with the columns of the protocol's `of_walk` and the model with its parameters as "spec"; and
+        the number of runs that could not be made, by the reason.
 
     Raises:
         SettingError: There is no walk at all, or none with one of the models.
@@ -114,7 +118,9 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
     models = list(dict.fromkeys(str(run.model) for run in sweep.experiments))
     check_models(table, models)
     order = table["model"].map({model: k for k, model in enumerate(models)})
-    table = table.iloc[order.argsort(kind="stable")].assign(model=lambda each: each["model"].str.split().str[0])
+    table = table.iloc[order.argsort(kind="stable")].assign(
+        spec=lambda each: each["model"], model=lambda each: each["model"].str.split().str[0]
+    )
     return table.reset_index(drop=True), {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
 
@@ -127,6 +133,7 @@ def _report(
     protocol: Protocol,
     results: StudyResults,
     outcomes: list[Outcome],
+    compared: dict[str, Any],
     *,
     about: dict[str, Any],
     left_out: dict[str, int],
@@ -151,6 +158,7 @@ def _report(
         blocks=[
             Section(title="Does it hold?", anchor="summary", blocks=summary),
             Section(title="Results", anchor="results", blocks=shown),
+            Section(title="Models compared", anchor="models", blocks=comparison_blocks(compared)),
             Section(
                 title="Differences from the original",
                 anchor="differences",
@@ -159,7 +167,7 @@ def _report(
             Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
         ],
         footer=f"After {protocol.paper} All numbers are in results.json, every walk is in runs.parquet.",
-        results=_results(protocol, results, outcomes, about=about, left_out=left_out),
+        results=_results(protocol, results, outcomes, about=about, left_out=left_out) | compared,
         headline=headline,
     )
 
