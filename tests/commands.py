@@ -40,7 +40,7 @@ KEYS = {
     },
     "play": {"recording", "screenshot"},
     "sweep": {"table", "runs", "done_before", "arrived", "could_not_run", "seconds", "recordings"},
-    "report": {"report", "results", "runs", "could_not_run", "arrived", "mean_deviation_m", "mean_error_deg"},
+    "report": {"report", "results", "runs", "worlds", "could_not_run", "arrived", "mean_deviation_m", "mean_error_deg"},
     "benchmark": {"results", "table"},
     "replicate": {"report", "results", "runs", "done_before", "could_not_run", "claims", "seconds"},
     "replicate thesis": _STUDY,

@@ -65,6 +65,7 @@ class ReportCommand(Command):
             "report": str(self.folder / REPORT),
             "results": str(self.folder / RESULTS),
             "runs": results["runs"],
+            "worlds": results["worlds"],
             "could_not_run": len(results["could_not_run"]),
             **{measure: found["value"] for measure, found in results["measures"].items()},
         }
