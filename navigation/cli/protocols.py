@@ -27,13 +27,16 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     PROTOCOL: ClassVar[str]
     world: Annotated[str | None, tyro.conf.arg(help=WORLD + " Default: that of the protocol.")] = None
     route: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
-    """A route through that world; give it several times, or several with commas between them. Default: generated routes."""
+    """A route through that world, or a folder: all files in it with `route` in their names. Give it several times, or several with commas
+    between them. Default: generated routes."""
     worlds: int | None = None
     """Number of generated worlds, or of generated routes through a given world. Default: that of the original."""
     seed: int = 0
     """Seed of the first generated world and route, the others follow; and of all noise and first weights."""
     cull_back_faces: bool = False
     """See triangles only from their front, as the original Sussex renderer did."""
+    as_published: bool = False
+    """The procedure of the original in every detail that is known, where the protocol has such a variant (docs/protocols.md)."""
     quick: bool = False
     """A first look of some minutes: fewer worlds and starts."""
     out: Path | None = None
@@ -58,7 +61,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             return replicate(protocol, sweep, out, about=about, command=command, workers=workers, progress=report)
 
     def protocol(self) -> "Protocol":
-        """The protocol of this command. Raises SettingError for something else of that name."""
+        """The protocol of this command, or its variant. Raises SettingError for something else of that name, and without a variant."""
         from ..studies.protocols import PROTOCOLS, Protocol
 
         protocol = PROTOCOLS.find(self.PROTOCOL)
@@ -66,7 +69,11 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             raise SettingError(
                 f"{self.PROTOCOL!r} is a {type(protocol).__name__}; give the name of a Protocol (tussock.navigation.studies.protocols)"
             )
-        return protocol
+        if not self.as_published:
+            return protocol
+        if protocol.as_published is None:
+            raise SettingError(f"--as-published: {self.PROTOCOL} has no such variant; leave it out")
+        return protocol.as_published
 
     def check(self) -> None:
         """Refuse flags that make no sense, alone or together. Raises SettingError."""
@@ -79,8 +86,10 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         self.chosen_workers()
 
     def routes(self) -> list[Path]:
-        """The given route files."""
-        return [Path(name) for given in self.route for name in given.split(",") if name]
+        """The given route files. Raises FileError for a folder without any."""
+        from tussock.world.route_files import routes_at
+
+        return [path for given in self.route for name in given.split(",") if name for path in routes_at(Path(name))]
 
     def sweep(self, protocol: "Protocol") -> "Sweep":
         """The runs, each checked. Raises SettingError."""

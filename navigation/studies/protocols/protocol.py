@@ -75,6 +75,7 @@ class Protocol:
         items: Figures and tables of the report.
         of_walk: Computes further columns for a walk, from its row of the table and its steps.
         world: World preset where none is given.
+        as_published: A variant with the procedure of the original in every detail that is known (`--as-published`).
     """
 
     name: str
@@ -93,6 +94,7 @@ class Protocol:
     items: Sequence[Item]
     of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = lambda row, steps: {}
     world: str = "tussock-field"
+    as_published: "Protocol | None" = None
 
     def __attrs_post_init__(self) -> None:
         names = [item.name for item in self.items]
