@@ -31,7 +31,10 @@ if TYPE_CHECKING:
     from .encoding import Encoding
     from .models.files import TrainedModel
 
-ON_LOST = {"next-waypoint": "reset", "nearest-point": "reset-nearest"}  # names of the setting, by where an agent is put back
+ON_LOST = {
+    "next-waypoint": "reset",
+    "nearest-point": "reset-nearest",
+}  # names of the setting, by where an agent is put back
 
 
 def experiment_of(settings: Mapping[str, Any], models: "dict[Path, TrainedModel] | None" = None) -> Experiment:

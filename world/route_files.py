@@ -69,7 +69,9 @@ def routes_at(path: Path) -> list[Path]:
     Raises:
         FileError: For a folder without such a file.
     """
-    if not path.is_dir() or (path / "database_entries.csv").is_file():  # `read_route` refuses an image database
+    if not os.path.isdir(path) or os.path.isfile(
+        path / "database_entries.csv"
+    ):  # `read_route` refuses an image database
         return [path]
     routes = sorted(each for each in path.iterdir() if "route" in each.name.lower() and each.is_file())
     if not routes:

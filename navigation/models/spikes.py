@@ -59,10 +59,9 @@ class Plasticity(NamedTuple):
 def steps_to_spike(
     current: Float64[np.ndarray, "*shape"], neuron: Neuron, presentation: int
 ) -> Int16[np.ndarray, "*shape"]:
-    """Steps that a constant current takes to make a resting neuron fire; `presentation` where it does not fire within this many steps,
-    less one.
+    """The step, from 0, in which a constant current makes a resting neuron fire; `presentation` where it does not within this many steps.
 
-    From V(n) = R I (1 - decay^n): with this number, the whole train of its spikes is known (`synaptic_currents`).
+    From V(n) = R I (1 - decay^n), after n steps. With this number, the whole train of spikes is known.
     """
     steps = np.arange(1, presentation + 1)
     resistance = neuron.gain / (1 - neuron.decay)
@@ -73,7 +72,10 @@ def steps_to_spike(
 def synaptic_currents(
     neuron: Neuron, weight: float, presentation: int, steps: int
 ) -> Float64[np.ndarray, "trains steps"]:
-    """Current that each train of spikes brings a neuron of the same kind in each step, by the number of `steps_to_spike`; none by the last."""
+    """Current that each train of spikes brings a neuron of the same kind in each step.
+
+    Row k is of the train whose first spike is in step k (see `steps_to_spike`); the last row is of no spike.
+    """
     currents = np.zeros((presentation + 1, steps))
     for first in range(presentation):
         synapse = 0.0

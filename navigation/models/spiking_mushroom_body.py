@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Float32, Float64, Int32, Int64
 
 from tussock.world.errors import SettingError
-from tussock.world.settings import choice, number, whole
+from tussock.world.settings import number, switch, whole
 
 from ..threads import in_threads
 from .base import Images, Learned, Scans, Shapes, model
@@ -49,8 +49,8 @@ class SpikingMushroomBody(IncrementalModel):
         tag_ms: Time constant of tags.
         dopamine: Amount that is released at the end of a presentation that is learned.
         dopamine_ms: Time constant of its clearance.
-        ties: Which of rotations with equally many spikes is more familiar: "input", that with the smaller sum of weights of the spikes
-            that reach the output neuron; "none", neither.
+        break_ties: Of rotations with equally many spikes that is more familiar which brings the output neuron less input: the sum of the
+            weights of all spikes that reach it. Otherwise they are equally familiar.
     """
 
     name = "spiking-mushroom-body"
@@ -75,7 +75,7 @@ class SpikingMushroomBody(IncrementalModel):
     tag_ms: float = number(40.0, low=0.01, unit="ms")
     dopamine: float = number(0.03, low=0)
     dopamine_ms: float = number(20.0, low=0.01, unit="ms")
-    ties: str = choice("input", ("input", "none"))
+    break_ties: bool = switch(True)
 
     @property
     def steps(self) -> int:
@@ -132,13 +132,13 @@ class SpikingMushroomBody(IncrementalModel):
                 counts, sums = np.empty(len(rotations)), np.empty(len(rotations))
                 spikes = self._spikes(view, rotations, wiring)
                 respond(spikes, synapses, self.steps, output, counts, sums)
-                scan[rotations] = -counts - (sums / (1 + sums) if self.ties == "input" else 0)  # from 0 to 1
+                scan[rotations] = -counts - (sums / (1 + sums) if self.break_ties else 0)  # from 0 to 1
         return self._on_device(torch.from_numpy(scans))
 
     def _spikes(
         self, view: Float32[torch.Tensor, "h w"], rotations: Int64[np.ndarray, " n"], wiring: torch.Tensor
     ) -> Int32[np.ndarray, "spikes 3"]:
-        """Spikes of the Kenyon cells at some rotations: the index of the rotation, the cell and the step of each. Nothing learned matters."""
+        """Spikes of the Kenyon cells at some rotations: the index of the rotation, the cell and the step of each."""
         cell = self._neuron(self.kenyon_synapse_ms)
         currents, highest = train_tables(cell, self.kenyon_weight, self.presentation_ms, self.steps)
         trains = steps_to_spike(self._currents(view, rotations), cell, self.presentation_ms).T

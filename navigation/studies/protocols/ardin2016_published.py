@@ -41,7 +41,17 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     displacement_cm = (100 * walks["offset_m"].abs()).round().astype(int)
     put_back = walks["on_lost"].map(PUT_BACK)
     walks = walks.assign(errors=walks["resets"].astype(float), displacement_cm=displacement_cm, put_back=put_back)
-    columns = ["model", "put_back", "place", "displacement_cm", "offset_m", "errors", "arrived", "steps", "mean_deviation_m"]
+    columns = [
+        "model",
+        "put_back",
+        "place",
+        "displacement_cm",
+        "offset_m",
+        "errors",
+        "arrived",
+        "steps",
+        "mean_deviation_m",
+    ]
     tables, numbers = {"walks": walks[columns]}, {}
     for name, some in walks[columns].groupby("put_back", sort=False):
         tables[f"walks {name}"] = some
@@ -111,7 +121,12 @@ def _errors(results: StudyResults, model: str) -> dict[str, float]:
     return {label: results.numbers[key] for key, label in labels.items() if key in results.numbers}
 
 
-@claim("random-worst", "by-model", "each of the others makes fewer errors per walk than random, with both ways of putting back", note=NOTE)
+@claim(
+    "random-worst",
+    "by-model",
+    "each of the others makes fewer errors per walk than random, with both ways of putting back",
+    note=NOTE,
+)
 def _random_worst(results: StudyResults) -> Decision:
     """All three memories make fewer errors than a random choice of direction."""
     random = _errors(results, RANDOM)
@@ -121,7 +136,9 @@ def _random_worst(results: StudyResults) -> Decision:
     return Decision(obtained, all(max(some) < most for some, most in zip(worst, random.values(), strict=True)))
 
 
-@claim("perfect-best", "by-model", "no other model makes fewer errors per walk, with both ways of putting back", note=NOTE)
+@claim(
+    "perfect-best", "by-model", "no other model makes fewer errors per walk, with both ways of putting back", note=NOTE
+)
 def _perfect_best(results: StudyResults) -> Decision:
     """Perfect memory, which stores every view, makes the fewest errors."""
     perfect = _errors(results, PERFECT)
@@ -139,8 +156,12 @@ def _perfect_best(results: StudyResults) -> Decision:
 )
 def _body_close(results: StudyResults) -> Decision:
     """The mushroom body follows routes nearly as well as perfect memory."""
-    obtained = {name: value for name, value in results.numbers.items() if name.startswith(SHARE) and not math.isnan(value)}
-    shares = [results.numbers[f"{SHARE}, {name}"] for name in PUT_BACK.values() if f"{SHARE}, {name}" in results.numbers]
+    obtained = {
+        name: value for name, value in results.numbers.items() if name.startswith(SHARE) and not math.isnan(value)
+    }
+    shares = [
+        results.numbers[f"{SHARE}, {name}"] for name in PUT_BACK.values() if f"{SHARE}, {name}" in results.numbers
+    ]
     return Decision(obtained, None if any(map(math.isnan, shares)) else max(shares) <= 0.1)
 
 
@@ -166,10 +187,18 @@ PARAMETERS = (
     ),
     Parameter("Arrival", "within 20 cm", "within 20 cm"),
     Parameter("Steps", "1,000 at most", "1,000 at most"),
-    Parameter("Starts", "on the route, and displaced by 5 to 25 cm", "on the route, and 5, 10, 15, 20 and 25 cm to both sides"),
-    Parameter("Mushroom body", "360 projection neurons, 20,000 Kenyon cells of 10 inputs, one output; spiking", "the same"),
-    Parameter("Spikes", "Izhikevich's neurons (paper); leaky integrate-and-fire (public code)", "leaky integrate-and-fire"),
-    Parameter("Ties of the output", "the first heading of the scan", "the heading with less input to the output neuron"),
+    Parameter(
+        "Starts", "on the route, and displaced by 5 to 25 cm", "on the route, and 5, 10, 15, 20 and 25 cm to both sides"
+    ),
+    Parameter(
+        "Mushroom body", "360 projection neurons, 20,000 Kenyon cells of 10 inputs, one output; spiking", "the same"
+    ),
+    Parameter(
+        "Spikes", "Izhikevich's neurons (paper); leaky integrate-and-fire (public code)", "leaky integrate-and-fire"
+    ),
+    Parameter(
+        "Ties of the output", "the first heading of the scan", "the heading with less input to the output neuron"
+    ),
 )
 
 DIFFERENCES = (
@@ -214,7 +243,12 @@ ITEMS = (
             walks, "displacement_cm", "errors", "displacement of the start (cm)", "errors per walk"
         ),
     ),
-    Item("by-displacement", "Errors by displacement", "by_displacement", "Mean errors per walk, over all routes and both sides."),
+    Item(
+        "by-displacement",
+        "Errors by displacement",
+        "by_displacement",
+        "Mean errors per walk, over all routes and both sides.",
+    ),
     Item("by-route", "Errors by route", "by_route", "Mean errors per walk, over all displacements."),
 )
 
