@@ -189,7 +189,10 @@ def test_a_mask_that_hides_nothing_makes_no_difference(name):
     if name.endswith(("random", "chain")):
         return  # numbers by another hash; what is a match, by another measure
     scan, other = model.scan(views(3, 1)), masked.scan(views(3, 1))
-    if name in ("mushroom-body", OPPONENT + "mushroom-body"):  # behind a mask contrast is that over the fields, not over the rotations
+    if name in (
+        "mushroom-body",
+        OPPONENT + "mushroom-body",
+    ):  # behind a mask contrast is that over the fields, not over the rotations
         assert torch.corrcoef(torch.stack([scan.flatten(), other.flatten()]))[0, 1] > 0.8
         return
     wrong = (scan - other).abs() > 1e-3 * (scan.max() - scan.min())

@@ -55,6 +55,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         sweep = self.sweep(protocol)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
+        sweep = self.sweep(protocol, out / "routes") if protocol.layout is not None else sweep
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
             command = self.command(out)
@@ -91,15 +92,17 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
 
         return [path for given in self.route for name in given.split(",") if name for path in routes_at(Path(name))]
 
-    def sweep(self, protocol: "Protocol") -> "Sweep":
-        """The runs, each checked. Raises SettingError."""
-        from ..studies.protocols import routes_in
+    def sweep(self, protocol: "Protocol", laid_out_in: Path | None = None) -> "Sweep":
+        """The runs, each checked; along routes as the protocol lays them out, if a folder for their files is given. Raises SettingError."""
+        from ..studies.protocols import laid_out, routes_in
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
         routes: list[Change] = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
         reading = self.reading()
         if reading != MeshReading():
             routes = [{**each, "reading": reading} for each in routes]
+        if laid_out_in is not None:
+            routes = laid_out(protocol, routes, laid_out_in)
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:

@@ -7,6 +7,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from tussock.render.eye import Eye
+from tussock.world.geometry import Route
+from tussock.world.routes import in_equal_steps
 
 from ...body import Body
 from ...experiment import Experiment
@@ -23,6 +25,10 @@ PUT_BACK = {"reset": "at the next waypoint", "reset-nearest": "at the nearest po
 MIN_ROUTES = 5  # for an interval
 SAMPLES = 4000  # of a bootstrap
 SHARE = "share of the way from perfect memory to random"
+
+
+def _layout(route: Route) -> Route:
+    return in_equal_steps(route, 0.1, math.radians(2))
 
 
 def _rules(put_back_at: str) -> StoppingRules:
@@ -169,6 +175,11 @@ CLAIMS = (_random_worst, _perfect_best, _body_close)
 
 PARAMETERS = (
     Parameter("Routes", "15 of about 8 m in the Sussex world", "those given, or 15 generated ones of 8 m"),
+    Parameter(
+        "Layout of a route",
+        "straight steps of 10 cm in multiples of 2 degrees (code): an agent that never errs stands where it has learned",
+        "the same",
+    ),
     Parameter("Views learned", "every 10 cm of the route", "every 10 cm of the route"),
     Parameter("Field of view", "296 degrees", "296 degrees, -15 to 60 degrees of elevation"),
     Parameter(
@@ -178,7 +189,7 @@ PARAMETERS = (
         "the same",
     ),
     Parameter("Step", "10 cm", "10 cm"),
-    Parameter("Scan", "120 degrees in steps of 2", "120 degrees in steps of 2, refined between steps"),
+    Parameter("Scan", "120 degrees in steps of 2", "120 degrees in steps of 2"),
     Parameter("Error", "more than 20 cm off the route", "the same"),
     Parameter(
         "After an error",
@@ -204,7 +215,6 @@ PARAMETERS = (
 DIFFERENCES = (
     "The constants of the circuit are those of its public reimplementation (BoB robotics, projects/ardin_mb). Each view starts with a "
     "circuit at rest; there, tags and dopamine of one learned view reach into the next, 80 ms later.",
-    "The most familiar rotation is refined by a parabola through its neighbours, by up to one degree.",
     "An agent that walks 3 m without progress along the route, or leaves the world, is put back as well, and that is an error.",
     "A start at 25 cm is put back at once, which is one error of every model.",
     "Unknown, and chosen by us: perfect memory compares by the RMS difference; the learning rate of Infomax is that for views in 0..1.",
@@ -261,7 +271,7 @@ ARDIN2016_AS_PUBLISHED = Protocol(
     experiment=Experiment(
         eye=Eye(width=720, height=152, samples=1, field=math.radians(296)),
         encoding="green 1 | centre-means 8 4 | invert | head-views 74 2 40 8 36 10",
-        navigator="scan width_deg=120",
+        navigator="scan width_deg=120 refine=false",
         route_length=8.0,
         training=TrainingSetup(spacing=0.1, learning_walk=0.0),
         body=Body(step_length=0.1),
@@ -280,4 +290,5 @@ ARDIN2016_AS_PUBLISHED = Protocol(
     measure=measure,
     claims=CLAIMS,
     items=ITEMS,
+    layout=_layout,
 )
