@@ -11,7 +11,7 @@ from scipy.stats import binom
 from tussock.navigation.feature_mask import FeatureMask
 from tussock.navigation.models import SpikingMushroomBody
 from tussock.navigation.models.spikes import Plasticity, learn, respond
-from tussock.navigation.models.spiking_mushroom_body import different
+from tussock.navigation.models.spiking_mushroom_body import different, warn_of_silence
 from tussock.world.errors import SettingError
 
 # So that the few cells of a tiny circuit fire, and its output neuron too.
@@ -170,6 +170,19 @@ def test_views_without_light_cause_no_spike():
     assert (model.learned["synapses"] == model.output_weight).all()
 
 
+def test_a_warning_says_once_that_hardly_a_cell_fires(caplog):
+    warn_of_silence.cache_clear()
+    for _ in range(2):
+        SpikingMushroomBody().fit(views(3))  # of mean 0
+    assert [record.message for record in caplog.records if "fewer than 10 Kenyon cells fire" in record.message] == [
+        caplog.records[0].message
+    ]
+    caplog.clear()
+    warn_of_silence.cache_clear()
+    SpikingMushroomBody().fit(pictures(3))
+    assert not caplog.records
+
+
 @pytest.mark.parametrize(("choices", "size"), [(5, 2), (4, 4), (3, 7), (1, 1)])
 def test_wiring_draws_every_set_equally_often(choices, size):
     drawn = different(choices, 6000, size, torch.Generator().manual_seed(1))
@@ -238,9 +251,10 @@ def by_brian(model: SpikingMushroomBody, pixels: np.ndarray) -> tuple[list[tuple
     b.prefs.codegen.target = "numpy"
     b.defaultclock.dt = b.ms
     membrane = """dv/dt = (current - v) / tau : 1 (unless refractory)
-                  current = resistance * (shown * int(t < presentation) + mean * s) : 1
+                  current = resistance * (shown + mean * held) : 1
                   s : 1
-                  shown : 1"""
+                  held : 1 (constant)
+                  shown : 1 (constant)"""
 
     def group(size: int, synapse_ms: float):
         # A spike is in the step before the one whose beginning counts here as its time: hence one more step of rest.
@@ -248,11 +262,11 @@ def by_brian(model: SpikingMushroomBody, pixels: np.ndarray) -> tuple[list[tuple
             size, membrane, threshold="v >= threshold", reset="v = 0", method="exact", refractory=(model.refractory_ms + 1) * b.ms,
             namespace={
                 "tau": model.membrane_ms * b.ms, "resistance": model.membrane_ms / model.capacitance,
-                "threshold": model.threshold_mv, "presentation": (model.presentation_ms - 0.5) * b.ms,
+                "threshold": model.threshold_mv,
                 "mean": synapse_ms * (1 - math.exp(-1 / synapse_ms)), "left": math.exp(-1 / synapse_ms),
             },
         )  # fmt: skip
-        made.run_regularly("s *= left", when="after_groups")
+        made.run_regularly("held = s\ns *= left", when="before_groups")
         return made
 
     wiring, synapses = model.learned["wiring"].numpy(), model.learned["synapses"].numpy()
@@ -266,7 +280,10 @@ def by_brian(model: SpikingMushroomBody, pixels: np.ndarray) -> tuple[list[tuple
     outward.connect()
     outward.w = synapses
     fired, answered = b.SpikeMonitor(kenyon), b.SpikeMonitor(output)
-    b.Network(projection, kenyon, output, inward, outward, fired, answered).run(model.steps * b.ms)
+    network = b.Network(projection, kenyon, output, inward, outward, fired, answered)
+    network.run(model.presentation_ms * b.ms)
+    projection.shown = 0
+    network.run(model.silence_ms * b.ms)
     steps = np.rint(np.asarray(fired.t / b.ms)).astype(int)
     return sorted(zip(np.asarray(fired.i).tolist(), steps.tolist(), strict=True)), int(answered.num_spikes)
 

@@ -1,5 +1,6 @@
 """The mushroom body of Ardin et al. (2016) with spiking neurons, and one-shot learning gated by dopamine."""
 
+import logging
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,9 @@ from .checks import check_scan
 from .incremental import IncrementalModel
 from .spikes import Neuron, Plasticity, fire, learn, peaks, respond, steps_to_spike, synaptic_currents
 
+log = logging.getLogger(__name__)
 NEURONS = 360  # projection neurons of the original, 36 x 10; its current is meant for so many
+MIN_CELLS = 10  # Kenyon cells that a view needs to be told from others
 NUMBERS = 2**23  # of pixels at rotations that are held at once: 64 MB
 
 
@@ -113,9 +116,13 @@ class SpikingMushroomBody(IncrementalModel):
             release=self.presentation_ms,
             clearance=self.dopamine_ms,
         )
+        few = 0
         for view in views.cpu():
             spikes = self._spikes(view, np.zeros(1, np.int64), learned["wiring"])
+            few += len(np.unique(spikes[:, 1])) < MIN_CELLS
             learn(spikes, synapses, self.steps, self._neuron(self.output_synapse_ms), rule)
+        if 2 * few > len(views):
+            warn_of_silence()
         return {"wiring": learned["wiring"], "synapses": self._on_device(torch.from_numpy(synapses))}
 
     def _shapes(self, height: int, width: int) -> Shapes:
@@ -174,6 +181,17 @@ class SpikingMushroomBody(IncrementalModel):
             synaptic_decay=synaptic_decay,
             synaptic_mean=synapse_ms * (1 - synaptic_decay),
         )
+
+
+@cache  # once is enough
+def warn_of_silence() -> None:
+    """Log that hardly a Kenyon cell fires."""
+    log.warning(
+        "%s: at most of the learned views fewer than %d Kenyon cells fire, so headings cannot be told apart; give an encoding of values from "
+        "0 to 1, not normalised, or a larger kenyon_weight",
+        SpikingMushroomBody.name,
+        MIN_CELLS,
+    )
 
 
 @cache
