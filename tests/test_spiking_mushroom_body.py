@@ -266,7 +266,7 @@ def by_brian(model: SpikingMushroomBody, pixels: np.ndarray) -> tuple[list[tuple
                 "mean": synapse_ms * (1 - math.exp(-1 / synapse_ms)), "left": math.exp(-1 / synapse_ms),
             },
         )  # fmt: skip
-        made.run_regularly("held = s\ns *= left", when="before_groups")
+        made.run_regularly("held = 1.0 * s\ns *= left", when="before_groups")
         return made
 
     wiring, synapses = model.learned["wiring"].numpy(), model.learned["synapses"].numpy()

@@ -187,8 +187,8 @@ class SpikingMushroomBody(IncrementalModel):
 def warn_of_silence() -> None:
     """Log that hardly a Kenyon cell fires."""
     log.warning(
-        "%s: at most of the learned views fewer than %d Kenyon cells fire, so headings cannot be told apart; give an encoding of values from "
-        "0 to 1, not normalised, or a larger kenyon_weight",
+        "%s: at most of the learned views fewer than %d Kenyon cells fire, so headings cannot be told apart; give an encoding of values "
+        "from 0 to 1, not normalised, or a larger kenyon_weight",
         SpikingMushroomBody.name,
         MIN_CELLS,
     )
