@@ -20,6 +20,7 @@ from .navigation import PerfectMemory as PerfectMemory
 from .navigation import RandomHeadings as RandomHeadings
 from .navigation import Recording as Recording
 from .navigation import Scan as Scan
+from .navigation import SpikingMushroomBody as SpikingMushroomBody
 from .navigation import Step as Step
 from .navigation import StoppingRules as StoppingRules
 from .navigation import StopReason as StopReason

@@ -16,6 +16,7 @@ from .models import MLPRotation as MLPRotation
 from .models import MushroomBody as MushroomBody
 from .models import PerfectMemory as PerfectMemory
 from .models import RandomHeadings as RandomHeadings
+from .models import SpikingMushroomBody as SpikingMushroomBody
 from .models import VisualCompass as VisualCompass
 from .models import make_model as make_model
 from .models import opponent as opponent

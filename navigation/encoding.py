@@ -22,11 +22,14 @@ from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Round, Scale, Views, Visible
+from .encoding_steps_published import STEPS as PUBLISHED
 from .feature_mask import FeatureMask
 from .overlap import remark_on_overlap
 
 STEPS = Registry(
-    "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
+    "encodings",
+    "encoding step",
+    {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *PUBLISHED)},
 )
 OLD_NAMES = {"sky-mask": "foreground-mask"}  # of steps; files and people may still use them
 PRESETS = {
@@ -96,8 +99,9 @@ class Encoding:
     def for_eye(self, eye: Eye) -> "EyeEncoding":
         """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
         known = eye.known
-        visible = eye.visible() if eye.masked or known is not None else None
-        if visible is None or (visible.all() and known is None):
+        one_column = any(getattr(step, "shows_one_column", False) for step in self.steps)
+        visible = eye.visible() if eye.masked or known is not None or one_column else None
+        if visible is None or (visible.all() and known is None and not one_column):
             return EyeEncoding(self, None)
         at = next((place for place, step in enumerate(self.steps) if isinstance(step, Normalise)), len(self.steps))
         local, rest = self.steps[:at], self.steps[at + 1 :]

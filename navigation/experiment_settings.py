@@ -31,6 +31,11 @@ if TYPE_CHECKING:
     from .encoding import Encoding
     from .models.files import TrainedModel
 
+ON_LOST = {
+    "next-waypoint": "reset",
+    "nearest-point": "reset-nearest",
+}  # names of the setting, by where an agent is put back
+
 
 def experiment_of(settings: Mapping[str, Any], models: "dict[Path, TrainedModel] | None" = None) -> Experiment:
     """The experiment that settings describe; those that are left out are as by default.
@@ -51,7 +56,7 @@ def experiment_of(settings: Mapping[str, Any], models: "dict[Path, TrainedModel]
         navigator=_navigator(given),
         training=TrainingSetup(**fields_of(given, "training")),
         body=Body(**fields_of(given, "body")),
-        stopping=StoppingRules(**fields_of(given, "stopping"), put_back=_put_back(given)),
+        stopping=StoppingRules(**fields_of(given, "stopping"), **_put_back(given)),
     )
 
 
@@ -80,7 +85,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "scan_deg": as_setting("scan_deg", width),
         "scan_about_deg": as_setting("scan_about_deg", about),
         "model": str(experiment.model),
-        "on_lost": "reset" if experiment.stopping.put_back else "stop",
+        "on_lost": ON_LOST[experiment.stopping.put_back_at] if experiment.stopping.put_back else "stop",
         "navigator": str(dataclasses.replace(navigator, parameters=parameters)),
     }
 
@@ -207,9 +212,10 @@ def _navigator(given: Mapping[str, Any]) -> Any:
     return dataclasses.replace(spec, parameters={**spec.parameters, **scan})
 
 
-def _put_back(given: Mapping[str, Any]) -> bool:
-    """Whether an agent that is lost is put back."""
+def _put_back(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The stopping rules that say whether, and where, an agent that is lost is put back."""
     on_lost = given.get("on_lost", "stop")
-    if on_lost not in ("stop", "reset"):
-        raise SettingError(f"--on-lost {on_lost!r}: give stop or reset")
-    return on_lost == "reset"
+    if on_lost not in ("stop", *ON_LOST.values()):
+        raise SettingError(f"--on-lost {on_lost!r}: give stop, {' or '.join(ON_LOST.values())}")
+    at = next((at for at, name in ON_LOST.items() if name == on_lost), None)
+    return {} if at is None else {"put_back": True, "put_back_at": at}

@@ -79,7 +79,11 @@ class FeatureMask:
 
     def pixels(self, views: Images) -> Float32[torch.Tensor, "n visible"]:
         """What is visible of views at their present heading."""
-        pixels = self.select(views).double()
+        return self.scaled_pixels(self.select(views))
+
+    def scaled_pixels(self, pixels: Float[torch.Tensor, "n visible"]) -> Float32[torch.Tensor, "n visible"]:
+        """Visible pixels of views, in rows, normalised where the mask says so."""
+        pixels = pixels.double()
         if self.normalised:
             deviation, mean = torch.std_mean(pixels, dim=1, keepdim=True, correction=0)
             pixels = (pixels - mean) / deviation.where(deviation > MIN_DEVIATION, torch.inf)

@@ -13,15 +13,17 @@ class StopCheck:
     Attributes:
         furthest: Greatest distance along the route that it has reached (m).
         since: Steps that it has made since it got there, in whole steps.
+        along: Distance along the route where it was checked last (m).
     """
 
     def __init__(self, stopping: StoppingRules, route: Route, field: Bounds, step_length: float):
         self.stopping, self.route, self.field, self.step_length = stopping, route, field, step_length
-        self.furthest, self.since = -np.inf, 0.0
+        self.furthest, self.since, self.along = -np.inf, 0.0, 0.0
         self.been_away = not self._at_goal(route.start)  # where the route ends near its start, it must leave first
 
     def check(self, pose: Pose, deviation: float, along: float) -> StopReason | None:
         """Why the walk ends at a pose, this far from the route and along it (m); None where it goes on."""
+        self.along = along
         if along > self.furthest:
             self.furthest, self.since = along, 0.0
         self.been_away = self.been_away or not self._at_goal(pose)
@@ -38,10 +40,12 @@ class StopCheck:
         self.since += share
 
     def put_back(self) -> Pose:
-        """Go on from the waypoint after the furthest point that was reached; its pose."""
+        """Go on from the waypoint after the furthest point that was reached, or from the nearest point of the route; its pose."""
+        self.since = 0.0
+        if self.stopping.put_back_at == "nearest-point":
+            return Pose(*self.route.at(self.along)[0].tolist()).rounded()
         spacing = self.stopping.waypoint_spacing
         self.furthest = min((np.floor(self.furthest / spacing + 1e-9) + 1) * spacing, self.route.length)
-        self.since = 0.0
         return Pose(*self.route.at(self.furthest)[0].tolist()).rounded()
 
     def _at_goal(self, pose: Pose) -> bool:

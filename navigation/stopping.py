@@ -3,7 +3,7 @@
 import math
 from enum import StrEnum
 
-from tussock.world.settings import number, settings, switch, whole
+from tussock.world.settings import choice, number, settings, switch, whole
 
 
 class StopReason(StrEnum):
@@ -30,8 +30,9 @@ class StoppingRules:
         patience: The agent is stuck after this distance without getting farther along the route (m).
         max_steps: Limit of steps; None means as many as three times the route's length needs.
         put_back: Instead of ending the walk, put an agent that is lost, stuck, out of the world, stopped by the ground or off the grid
-            back on the route, at the waypoint after the furthest one that it reached, facing along the route. Ardin et al. (2016)
-            count errors so.
+            back on the route, facing along the route. Ardin et al. (2016) count errors so.
+        put_back_at: Where: "next-waypoint" is the waypoint after the furthest one that it reached, "nearest-point" the nearest point of
+            the route.
         waypoint_spacing: Distance between waypoints along the route (m).
     """
 
@@ -40,6 +41,7 @@ class StoppingRules:
     patience: float = number(3.0, above=0, unit="m")
     max_steps: int | None = whole(None, optional=True)
     put_back: bool = switch(False)
+    put_back_at: str = choice("next-waypoint", ("next-waypoint", "nearest-point"))
     waypoint_spacing: float = number(0.1, above=0, unit="m")
 
     def step_limit(self, route_length: float, step_length: float) -> int:

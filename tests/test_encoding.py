@@ -11,6 +11,7 @@ from tussock.navigation import encoding_steps
 from tussock.navigation.block_means import block_means
 from tussock.navigation.encoding import PRESETS, Encoding
 from tussock.navigation.encoding_steps import Clahe, Grey, Normalise
+from tussock.navigation.models import PerfectMemory
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import InputError, SettingError
@@ -24,6 +25,7 @@ CHAINS = [
     "foreground-mask | vertical-edges",
     "grey | normalise",
     "grey | invert",
+    "green 0.5",
     "grey | resize 3 | widen 5",
     "grey | normalise | scale 0.25",
     "foreground-mask | blur 2 | vertical-edges | resize 3 | normalise",
@@ -291,3 +293,106 @@ def test_any_view_is_equalised_to_values_from_0_to_1(height, tiles, wide, level)
     features = Encoding.parse(f"grey | clahe 2 {tiles}")(view).numpy()
     assert features.shape == view.shape[:3]
     assert ((features >= 0) & (features <= 1)).all()
+
+
+# As published
+
+HEADS = "green 1 | centre-means 8 4 | invert | head-views 10 2 40 4 7 3"  # of 120 x 48: 30 columns of 12 degrees, of which a head sees 20
+
+
+@pytest.fixture(scope="module")
+def tall_views():
+    with open_renderer(random_world(), Eye(width=120, height=48, samples=1, z=0.05), "cpu") as renderer:
+        return renderer.render(random_poses(3))
+
+
+def seen_by_a_head(view: np.ndarray) -> np.ndarray:
+    """What a head sees that faces ahead, step by step as the published program does it: 80 of 120 columns, in blocks of 8 x 8."""
+    green = np.where(view[..., 3] == 0, 255, view[..., 1])[:, 20:100].astype(float)
+    means = np.array([[green[y + 2 : y + 6, x + 2 : x + 6].mean() for x in range(0, 80, 8)] for y in range(0, 48, 8)])
+    equalised = cv2.createCLAHE(40.0, (4, 4)).apply(np.rint(255 - means).astype(np.uint8))
+    return cv2.resize(equalised, (7, 3), interpolation=cv2.INTER_CUBIC)
+
+
+def test_head_views_are_those_of_a_program_that_turns_the_head(tall_views):
+    features = np.rint(255 * Encoding.parse(HEADS)(tall_views).numpy())
+    assert features.shape == (3, 21, 30)
+    for view, columns in zip(tall_views, features, strict=True):
+        for k in range(30):  # turned left by 12 degrees k times
+            expected = seen_by_a_head(np.roll(view, 4 * k, axis=1)).ravel()
+            away = np.abs(columns[:, (15 - k) % 30] - expected)
+            assert away.max() <= 12  # where a mean is midway between two levels, it may be rounded either way
+            assert (away > 0).mean() < 0.2
+    assert features.std() > 20
+
+
+def test_head_views_turn_with_the_eye_to_the_last_bit(tall_views):
+    encoding = Encoding.parse(HEADS)
+    rolled = encoding(np.roll(tall_views, 4 * 7, axis=2)).numpy()
+    assert np.array_equal(rolled, np.roll(encoding(tall_views).numpy(), 7, axis=2))
+
+
+@pytest.mark.parametrize("degrees", [240, 300, 360])
+def test_models_compare_one_head_view_at_each_rotation(tall_views, degrees):
+    encoded = Encoding.parse(HEADS).for_eye(Eye(width=120, height=48, field=np.radians(degrees)))
+    assert encoded.mask.visible.sum() == 21
+    features = encoded(tall_views)
+    scan = PerfectMemory().see(encoded.mask).fit(features[:2]).scan(features[2:])[0].numpy()
+    views = Encoding.parse(HEADS)(tall_views).double().numpy()
+    seen = np.stack([views[2, :, (15 - k) % 30] for k in range(30)])
+    nearest = np.sqrt(((seen[:, None] - views[:2, :, 15]) ** 2).mean(axis=2)).min(axis=1)
+    assert np.allclose(-scan, nearest, atol=1e-5)
+
+
+def test_head_views_of_more_than_the_eye_sees_are_refused():
+    with pytest.raises(SettingError, match="head-views shows 240 degrees, of which the eye does not see all"):
+        Encoding.parse(HEADS).for_eye(Eye(width=120, height=48, field=np.radians(220)))
+
+
+def test_green_is_the_green_channel_under_a_sky_of_any_brightness(tall_views):
+    green = Encoding.parse("green 0.3")(tall_views).numpy()
+    open_sky = tall_views[..., 3] == 0
+    assert 0.05 < open_sky.mean() < 0.95
+    assert np.allclose(green[open_sky], 0.3)
+    assert np.allclose(green[~open_sky], tall_views[..., 1][~open_sky] / 255)
+    opaque = np.ascontiguousarray(tall_views[..., :3])
+    assert np.allclose(Encoding.parse("green 0.3")(opaque), opaque[..., 1] / 255)
+
+
+def test_a_field_hides_centre_means_of_hidden_pixels_alone():
+    visible = np.zeros((8, 24), bool)
+    visible[2:6, 2:6] = True  # the central half of the first block
+    shown = Encoding.parse("grey | centre-means 8 4").visible(visible)
+    assert shown.tolist() == [[True, False, False, False, False, False]]
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("green 1 | centre-means 6 2", ("block is 6", "multiple of 4")),
+        ("green 1 | centre-means 8 1.5", ("every is 1.5", "whole number")),
+        (
+            "green 1 | head-views 74 2 40 8 36",
+            ("head-views takes 6 numbers (columns, stride, clip, tiles, width, height)",),
+        ),
+        ("green 1 | head-views 74 2 40 8.5 36 10", ("tiles is 8.5", "whole number")),
+        ("green 1 | normalise | head-views 74 2 40 8 36 10", ("head-views takes values from 0 to 1",)),
+        ("green", ("green takes 1 number (sky)",)),
+    ],
+)
+def test_an_invalid_chain_as_published_is_refused(text, parts):
+    with pytest.raises(SettingError) as refused:
+        Encoding.parse(text)
+    assert all(part in str(refused.value) for part in parts), str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("green 1 | centre-means 8 7", "a width that 7 divides and a height that 8 divides"),
+        ("green 1 | head-views 61 2 40 4 7 3", "more than all 120; give fewer"),
+    ],
+)
+def test_views_that_are_too_small_for_a_chain_as_published_are_refused(text, message):
+    with pytest.raises(SettingError, match=message):
+        Encoding.parse(text)(np.zeros((1, 48, 120, 4), np.uint8))

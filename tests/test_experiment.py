@@ -83,7 +83,7 @@ VALUES: dict[str, st.SearchStrategy] = {
     "heading_noise_deg": decimals(0, 90),
     "scan_deg": decimals(0.001, 360),
     "scan_about_deg": decimals(-360, 360),
-    "on_lost": st.sampled_from(["stop", "reset"]),
+    "on_lost": st.sampled_from(["stop", "reset", "reset-nearest"]),
     "waypoint_m": POSITIVE,
     "arrive_m": POSITIVE,
     "lost_m": POSITIVE,
@@ -202,7 +202,7 @@ def test_settings_are_checked_together_and_not_against_the_defaults_of_others(to
     [
         ({"size": "720x150", "samples": 64}, ["720 x 150", "fewer"]),
         ({"top_deg": -20.0}, ["-15", "-20"]),
-        ({"on_lost": "cry"}, ["'cry'", "stop or reset"]),
+        ({"on_lost": "cry"}, ["'cry'", "stop, reset or reset-nearest"]),
         ({"scan_deg": 400.0}, ["width", "400 degrees"]),
         ({"navigator": "scan width=1", "scan_deg": 90.0}, ["width", "once"]),
         ({"every": 0}, ["every", "0"]),

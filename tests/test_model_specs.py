@@ -33,6 +33,8 @@ def chosen(draw, cls: type[Model]) -> dict[str, Any]:
 
 def values(default: Any, metadata: Any) -> st.SearchStrategy:
     """Valid values of a parameter with this default."""
+    if isinstance(default, bool):
+        return st.booleans()
     if "choices" in metadata:
         return st.sampled_from(metadata["choices"])
     if isinstance(default, tuple):

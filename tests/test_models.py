@@ -25,13 +25,14 @@ BUILTIN = list(MODELS.builtin)
 NAMES = [*BUILTIN, *(OPPONENT + name for name in ("perfect-memory", "infomax", "mlp", "random"))]
 KEEPS_VIEWS = {"perfect-memory", "chain"}  # their memory grows with the route
 DRAWS_NOTHING = {"visual-compass", "perfect-memory", "chain"}
-INCREMENTAL = {"perfect-memory", "chain", "infomax", "mushroom-body"}
+INCREMENTAL = {"perfect-memory", "chain", "infomax", "mushroom-body", "spiking-mushroom-body"}
 LEARNS_NOTHING = {"random"}  # controls
 THRESHOLDS = {"adaboost", "mushroom-body"}  # whose scans jump where a sum crosses a threshold
 
 # Models are trained with their defaults, but for one: its default is passes over a route of hundreds of views, and on a
-# dozen they are too few updates to learn anything.
-PARAMETERS = {"rbm": {"epochs": 500}}
+# dozen they are too few updates to learn anything. And the weights of spikes are for images of positive values: white noise makes
+# few cells fire.
+PARAMETERS = {"rbm": {"epochs": 500}, "spiking-mushroom-body": {"kenyon_weight": 0.1}}
 
 
 def base(name: str) -> str:

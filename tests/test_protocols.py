@@ -31,15 +31,19 @@ from tussock.navigation.studies.protocols import (
     KAGIOULIS2024,
     PROTOCOLS,
     Protocol,
+    laid_out,
     routes_in,
 )
+from tussock.navigation.studies.protocols.ardin2016_published import share_of_the_way
 from tussock.navigation.studies.protocols.azevedo2025 import of_walk
 from tussock.navigation.studies.protocols.effects import over_routes
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
 from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
-from tussock.world.errors import SettingError
+from tussock.world.errors import FileError, SettingError
 from tussock.world.files import write_world
+from tussock.world.geometry import Route
+from tussock.world.route_files import read_route, routes_at, write_route
 from tussock.world.scene import World
 
 TINY = ("--quick", "--world", "tiny", "--worlds", "2")
@@ -513,3 +517,107 @@ def test_a_protocol_that_a_script_registers_is_a_command(monkeypatch, tmp_path, 
         main(["replicate", "mine", "--worlds", "0", "--out", str(tmp_path / "out")])
     assert end.value.code == 2
     assert "--worlds 0" in capsys.readouterr().err
+
+
+# As published
+
+
+def test_ardin_as_published_is_as_published():
+    protocol = ARDIN2016.as_published
+    runs = runs_of(protocol)
+    assert protocol.worlds == 15
+    assert len(runs) == 2 * 4 * 2 * 11
+    for name, value in {
+        "spacing_m": 0.1, "step_m": 0.1, "scan_deg": 120, "lost_m": 0.2, "arrive_m": 0.2, "max_steps": 1000, "field_deg": 296,
+        "route_length_m": 8, "learning_walk_m": 0,
+    }.items():  # fmt: skip
+        assert values(runs, name) == {value}, name
+    assert values(runs, "on_lost") == {"reset", "reset-nearest"}
+    assert sorted(values(runs, "offset_m")) == [-0.25, -0.2, -0.15, -0.1, -0.05, 0, 0.05, 0.1, 0.15, 0.2, 0.25]
+    assert features_of(runs[0]) == (180, 36 * 10)  # a view of 36 x 10 at every second degree
+    (body,) = {str(run.model): run.make_model() for run in runs if run.model.name == "spiking-mushroom-body"}.values()
+    assert (body.mask.count, body.cells, body.inputs) == (360, 20_000, 10)
+    assert runs[0].navigator.parameters["refine"] is False
+
+
+def test_routes_as_published_are_steps_of_10_cm_in_even_degrees(tmp_path):
+    path = tmp_path / "curved.csv"
+    angles = np.linspace(0, 1.2, 90)
+    write_route(Route.through(0.5 + 2 * np.column_stack([np.cos(angles), np.sin(angles)])), path)
+    plain = routes_in("tiny", [path])
+    (laid,) = laid_out(ARDIN2016.as_published, plain, tmp_path / "routes")
+    assert laid["route"] == tmp_path / "routes" / "01-curved.csv"
+    route, given = read_route(laid["route"]), read_route(path)
+    steps = np.diff(route.xy, axis=0)
+    assert np.allclose(np.hypot(*steps.T), 0.1)
+    degrees = np.degrees(np.arctan2(steps[:, 1], steps[:, 0]))
+    assert np.allclose(degrees / 2, np.rint(degrees / 2), atol=1e-6)
+    assert given.nearest(route.xy)[0].max() < 0.03
+    assert laid_out(ARDIN2016, plain, tmp_path / "none") == plain
+    assert not (tmp_path / "none").exists()
+
+
+def published_walks(errors: dict[str, list[float]], put_back=("reset", "reset-nearest")) -> pd.DataFrame:
+    """Walks of each model with these errors, one on each route."""
+    rows = [
+        {"model": model, "resets": value, "place": f"route {k}", "on_lost": on_lost}
+        for model, of_model in errors.items()
+        for on_lost in put_back
+        for k, value in enumerate(of_model)
+    ]
+    table = pd.DataFrame(rows)
+    return walks(**{name: table[name] for name in table})
+
+
+def test_ardin_as_published_by_hand():
+    protocol = ARDIN2016.as_published
+    errors = {"perfect-memory": [0, 2], "spiking-mushroom-body": [4, 6], "infomax": [5, 9], "random": [20, 22]}
+    results = protocol.measure(published_walks(errors))
+    table = results.tables["by_model"].set_index(["model", "put_back"])
+    assert table.loc[("infomax", "at the nearest point"), "errors a walk"] == 7
+    assert table["low"].isna().all()  # of two routes
+    share = "share of the way from perfect memory to random, at the next waypoint"
+    assert results.numbers[share] == 4 / 20
+    assert np.isnan(results.numbers[f"{share}, low"])
+    assert holds(protocol, results) == {"random-worst": True, "perfect-best": True, "body-close": False}
+    close = protocol.measure(published_walks(errors | {"spiking-mushroom-body": [1, 2]}))
+    assert holds(protocol, close)["body-close"] is True
+    worst = protocol.measure(published_walks(errors | {"infomax": [30, 40]}))
+    assert holds(protocol, worst)["random-worst"] is False
+
+
+def test_the_interval_of_a_share_is_over_routes():
+    random = np.random.default_rng(1)
+    difficulty = random.uniform(0, 10, 12)
+    errors = {
+        "perfect-memory": difficulty,
+        "spiking-mushroom-body": difficulty + 5,
+        "infomax": difficulty,
+        "random": difficulty + 20,
+    }
+    table = published_walks(errors, ["reset"]).rename(columns={"resets": "errors"})
+    value, low, high = share_of_the_way(table)
+    assert (value, low, high) == pytest.approx((0.25, 0.25, 0.25))  # the same on each route, however difficult
+    errors["spiking-mushroom-body"] = difficulty + random.uniform(0, 10, 12)
+    value, low, high = share_of_the_way(published_walks(errors, ["reset"]).rename(columns={"resets": "errors"}))
+    assert low < value < high
+    assert 0.05 < high - low < 0.3  # about 2 x 1.96 x (10 / 12 ** 0.5) / 12 ** 0.5 / 20
+
+
+@pytest.mark.parametrize("name", ["baddeley2012", "azevedo2025"])
+def test_a_protocol_without_a_variant_refuses_as_published_in_one_line(name, capsys, tmp_path):
+    with pytest.raises(SystemExit) as end:
+        main(["replicate", name, "--as-published", "--out", str(tmp_path / "out")])
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert f"--as-published: {name} has no such variant" in line
+
+
+def test_a_folder_stands_for_the_routes_in_it(tmp_path):
+    for name in ("ant2_route1.csv", "ant1_route1.csv", "world.bin", "README.md"):
+        (tmp_path / name).touch()
+    assert [path.name for path in routes_at(tmp_path)] == ["ant1_route1.csv", "ant2_route1.csv"]
+    assert routes_at(tmp_path / "world.bin") == [tmp_path / "world.bin"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FileError, match="no file with 'route' in its name"):
+        routes_at(tmp_path / "empty")

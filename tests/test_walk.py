@@ -202,6 +202,27 @@ def test_a_lost_agent_is_put_back_after_the_furthest_waypoint_and_gets_home(rend
     assert not any(step.reason for step in steps[:-1])
 
 
+def test_a_lost_agent_is_put_back_at_the_nearest_point_of_the_route(renderer):
+    walker = agent(
+        renderer,
+        STRAIGHT,
+        Turner(3),
+        scan_width=2 * np.pi,
+        max_deviation=0.1,
+        put_back=True,
+        put_back_at="nearest-point",
+        step_length=0.05,
+    )
+    steps = list(walker.walk(walker.start()))
+    assert steps[-1].reason == StopReason.ARRIVED
+    resets = [(before, after) for before, after in pairwise(steps) if after.reset]
+    assert len(resets) >= 3
+    for before, after in resets:
+        assert after.deviation < 1e-9
+        assert np.isclose(after.along, before.along)
+        assert np.isclose(after.pose.heading, 0)
+
+
 def test_a_route_that_ends_where_it_starts_is_walked_around(renderer):
     angle = np.linspace(0, 2 * np.pi, 64)
     ring = Route.through(1.5 + 0.6 * np.column_stack([np.cos(angle), np.sin(angle)]))

@@ -75,6 +75,23 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     )
 
 
+def in_equal_steps(route: Route, step: float, turn: float) -> Route:
+    """A route along another one in straight steps of one length, whose directions are multiples of an angle.
+
+    An agent with this step that always turns by the right multiple of the angle stands on its points exactly. It drifts away from the
+    given route by up to some centimetres. So the program of Ardin et al. (2016) lays out its routes, with 10 cm and 2 degrees.
+
+    Args:
+        route: The route.
+        step: Length of each step (m).
+        turn: The angle (rad).
+    """
+    along = np.diff(route.resampled(step).xy, axis=0)
+    headings = turn * np.rint(np.arctan2(along[:, 1], along[:, 0]) / turn)
+    steps = step * np.column_stack([np.cos(headings), np.sin(headings)])
+    return Route.through(np.vstack([route.xy[:1], route.xy[0] + np.cumsum(steps, axis=0)]))
+
+
 def check_length(length: float) -> None:
     """Refuse an invalid length of a route (m). Raises SettingError."""
     if not MIN_LENGTH <= length < np.inf:

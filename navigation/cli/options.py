@@ -221,8 +221,9 @@ class RunOptions(ModelOptions):
     """Width of the scan. Default: 180."""
     scan_about_deg: float | None = None
     """Centre the scan on this direction of the world instead of the present heading."""
-    on_lost: Annotated[str, tyro.conf.arg(metavar="stop|reset")] = "stop"
-    """stop, or reset: put the agent back on the route at the waypoint after the furthest one reached, and count it."""
+    on_lost: Annotated[str, tyro.conf.arg(metavar="stop|reset|reset-nearest")] = "stop"
+    """stop, or reset: put the agent back on the route at the waypoint after the furthest one reached, and count it. reset-nearest: the
+    same, at the nearest point of the route."""
     waypoint_m: float = default(StoppingRules, "waypoint_spacing")
     """Distance along the route between these waypoints."""
     arrive_m: float = default(StoppingRules, "arrival_radius")

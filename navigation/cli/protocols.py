@@ -27,13 +27,16 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     PROTOCOL: ClassVar[str]
     world: Annotated[str | None, tyro.conf.arg(help=WORLD + " Default: that of the protocol.")] = None
     route: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
-    """A route through that world; give it several times, or several with commas between them. Default: generated routes."""
+    """A route through that world, or a folder: all files in it with `route` in their names. Give it several times, or several with commas
+    between them. Default: generated routes."""
     worlds: int | None = None
     """Number of generated worlds, or of generated routes through a given world. Default: that of the original."""
     seed: int = 0
     """Seed of the first generated world and route, the others follow; and of all noise and first weights."""
     cull_back_faces: bool = False
     """See triangles only from their front, as the original Sussex renderer did."""
+    as_published: bool = False
+    """The procedure of the original in every detail that is known, where the protocol has such a variant (docs/protocols.md)."""
     quick: bool = False
     """A first look of some minutes: fewer worlds and starts."""
     out: Path | None = None
@@ -52,13 +55,14 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         sweep = self.sweep(protocol)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
+        sweep = self.sweep(protocol, out / "routes") if protocol.layout is not None else sweep
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
             command = self.command(out)
             return replicate(protocol, sweep, out, about=about, command=command, workers=workers, progress=report)
 
     def protocol(self) -> "Protocol":
-        """The protocol of this command. Raises SettingError for something else of that name."""
+        """The protocol of this command, or its variant. Raises SettingError for something else of that name, and without a variant."""
         from ..studies.protocols import PROTOCOLS, Protocol
 
         protocol = PROTOCOLS.find(self.PROTOCOL)
@@ -66,7 +70,11 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             raise SettingError(
                 f"{self.PROTOCOL!r} is a {type(protocol).__name__}; give the name of a Protocol (tussock.navigation.studies.protocols)"
             )
-        return protocol
+        if not self.as_published:
+            return protocol
+        if protocol.as_published is None:
+            raise SettingError(f"--as-published: {self.PROTOCOL} has no such variant; leave it out")
+        return protocol.as_published
 
     def check(self) -> None:
         """Refuse flags that make no sense, alone or together. Raises SettingError."""
@@ -79,18 +87,22 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         self.chosen_workers()
 
     def routes(self) -> list[Path]:
-        """The given route files."""
-        return [Path(name) for given in self.route for name in given.split(",") if name]
+        """The given route files. Raises FileError for a folder without any."""
+        from tussock.world.route_files import routes_at
 
-    def sweep(self, protocol: "Protocol") -> "Sweep":
-        """The runs, each checked. Raises SettingError."""
-        from ..studies.protocols import routes_in
+        return [path for given in self.route for name in given.split(",") if name for path in routes_at(Path(name))]
+
+    def sweep(self, protocol: "Protocol", laid_out_in: Path | None = None) -> "Sweep":
+        """The runs, each checked; along routes as the protocol lays them out, if a folder for their files is given. Raises SettingError."""
+        from ..studies.protocols import laid_out, routes_in
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
         routes: list[Change] = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
         reading = self.reading()
         if reading != MeshReading():
             routes = [{**each, "reading": reading} for each in routes]
+        if laid_out_in is not None:
+            routes = laid_out(protocol, routes, laid_out_in)
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:

@@ -14,4 +14,5 @@ from .rbm import RBM as RBM
 from .registry import MODELS as MODELS
 from .specs import make_model as make_model
 from .specs import model_spec as model_spec
+from .spiking_mushroom_body import SpikingMushroomBody as SpikingMushroomBody
 from .visual_compass import VisualCompass as VisualCompass

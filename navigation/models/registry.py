@@ -20,6 +20,7 @@ MODELS = Registry(
             "autoencoder": "autoencoder:Autoencoder",
             "infomax": "infomax:Infomax",
             "mushroom-body": "mushroom_body:MushroomBody",
+            "spiking-mushroom-body": "spiking_mushroom_body:SpikingMushroomBody",
         }.items()
     },
 )

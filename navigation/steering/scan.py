@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool
 
 from tussock.world.geometry import columns_of_turn, wrap_angle
-from tussock.world.settings import number, settings
+from tussock.world.settings import number, settings, switch
 
 from ..models.base import FamiliarityModel, Following, SequenceModel, SnapshotModel
 from ..scan import best_turn, scan_window
@@ -26,11 +26,13 @@ class Scan:
         model: What tells how familiar a view is at each rotation.
         width: Full width of the window (rad).
         about: Direction of the world in the middle of the window (rad); None means the present heading.
+        refine: Turn to the peak of a parabola through the most familiar rotation and its neighbours, not to that rotation itself.
     """
 
     model: FamiliarityModel = attrs.field()
     width: float = number(np.pi, above=0, high=2 * np.pi, unit="rad")
     about: float | None = number(None, optional=True, unit="rad")
+    refine: bool = switch(True)
 
     def learn(self, views: Images) -> None:
         """Train the model on the views."""
@@ -45,7 +47,7 @@ class Scan:
         width = look.views.shape[2]
         windows = self._windows(width, look)
         familiarity, matches = self._compare(look.views, windows, memories)
-        turn = best_turn(familiarity, windows)
+        turn = best_turn(familiarity, windows, interpolate=self.refine)
         columns = np.rint(columns_of_turn(turn, width)).astype(int) % width
         match = None if matches is None else matches[np.arange(len(look)), columns]
         progress = [None if memory is None else memory.progress for memory in memories]

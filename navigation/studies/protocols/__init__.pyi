@@ -5,5 +5,6 @@ from .kagioulis2024 import KAGIOULIS2024 as KAGIOULIS2024
 from .protocol import Item as Item
 from .protocol import Parameter as Parameter
 from .protocol import Protocol as Protocol
+from .protocol import laid_out as laid_out
 from .protocol import routes_in as routes_in
 from .registry import PROTOCOLS as PROTOCOLS

@@ -10,6 +10,7 @@ from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
+from .ardin2016_published import ARDIN2016_AS_PUBLISHED
 from .effects import over_routes
 from .figures import boxes, lines_by_model
 from .protocol import Item, Parameter, Protocol, models_in
@@ -200,4 +201,5 @@ ARDIN2016 = Protocol(
     measure=measure,
     claims=CLAIMS,
     items=ITEMS,
+    as_published=ARDIN2016_AS_PUBLISHED,
 )

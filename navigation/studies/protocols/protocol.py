@@ -11,7 +11,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from tussock.world.errors import SettingError
+from tussock.world.geometry import Route
 from tussock.world.params import is_generated
+from tussock.world.route_files import write_route
 from tussock.world.settings import settings, whole
 
 from ...experiment import Experiment
@@ -75,6 +77,8 @@ class Protocol:
         items: Figures and tables of the report.
         of_walk: Computes further columns for a walk, from its row of the table and its steps.
         world: World preset where none is given.
+        layout: Makes the route that is learned and walked of each route; None takes the route itself.
+        as_published: A variant with the procedure of the original in every detail that is known (`--as-published`).
     """
 
     name: str
@@ -93,6 +97,8 @@ class Protocol:
     items: Sequence[Item]
     of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = lambda row, steps: {}
     world: str = "tussock-field"
+    layout: Callable[[Route], Route] | None = None
+    as_published: "Protocol | None" = None
 
     def __attrs_post_init__(self) -> None:
         names = [item.name for item in self.items]
@@ -134,6 +140,26 @@ def routes_in(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) 
         paths = [route.resolve() if route.is_file() else route for route in routes]
         return [{"world": world, "world_seed": seed, "route": path} for path in paths]
     return [{"world": world, "world_seed": each, "route_seed": each} for each in range(seed, seed + count)]
+
+
+def laid_out(protocol: Protocol, routes: list[Change], folder: Path) -> list[Change]:
+    """Routes as the protocol lays them out, each in a file in a folder, where it does so; otherwise the routes themselves.
+
+    Args:
+        protocol: The experiment.
+        routes: Worlds with one route each; see `routes_in`.
+        folder: For the files, which are replaced.
+    """
+    if protocol.layout is None:
+        return routes
+    folder.mkdir(parents=True, exist_ok=True)
+    changed = []
+    for number, each in enumerate(routes, 1):
+        _, route = protocol.experiment.replace(**each).open_world_and_route()
+        name = Path(each["route"]).stem if "route" in each else f"seed{each['route_seed']}"
+        write_route(protocol.layout(route), path := folder / f"{number:02}-{name}.csv")
+        changed.append({**each, "route": path.resolve()})
+    return changed
 
 
 def route_names(rows: Collection[dict[str, Any]]) -> list[str]:
