@@ -22,11 +22,12 @@ from tussock.world.specs import signature_of
 
 from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views, Visible
+from .encoding_steps_colour import COLOUR_STEPS
 from .feature_mask import FeatureMask
 from .overlap import remark_on_overlap
 
 STEPS = Registry(
-    "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in BUILTIN}
+    "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *COLOUR_STEPS)}
 )
 OLD_NAMES = {"sky-mask": "foreground-mask"}  # of steps; files and people may still use them
 PRESETS = {

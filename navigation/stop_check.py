@@ -18,10 +18,12 @@ class StopCheck:
     def __init__(self, stopping: StoppingRules, route: Route, field: Bounds, step_length: float):
         self.stopping, self.route, self.field, self.step_length = stopping, route, field, step_length
         self.furthest, self.since = -np.inf, 0.0
+        self.along, self.resumed = 0.0, 0.0  # where it is now, and where it was put back last
         self.been_away = not self._at_goal(route.start)  # where the route ends near its start, it must leave first
 
     def check(self, pose: Pose, deviation: float, along: float) -> StopReason | None:
         """Why the walk ends at a pose, this far from the route and along it (m); None where it goes on."""
+        self.along = along
         if along > self.furthest:
             self.furthest, self.since = along, 0.0
         self.been_away = self.been_away or not self._at_goal(pose)
@@ -38,9 +40,13 @@ class StopCheck:
         self.since += share
 
     def put_back(self) -> Pose:
-        """Go on from the waypoint after the furthest point that was reached; its pose."""
-        spacing = self.stopping.waypoint_spacing
-        self.furthest = min((np.floor(self.furthest / spacing + 1e-9) + 1) * spacing, self.route.length)
+        """Go on from where the rules say; its pose."""
+        spacing, ahead = self.stopping.waypoint_spacing, self.stopping.put_back_ahead
+        if ahead is None:
+            target = (np.floor(self.furthest / spacing + 1e-9) + 1) * spacing
+        else:
+            target = max(self.along, self.resumed) + ahead  # never behind where it was put back before
+        self.furthest = self.resumed = min(target, self.route.length)
         self.since = 0.0
         return Pose(*self.route.at(self.furthest)[0].tolist())
 

@@ -33,6 +33,8 @@ class StoppingRules:
             back on the route, at the waypoint after the furthest one that it reached, facing along the route. Ardin et al. (2016)
             count errors so.
         waypoint_spacing: Distance between waypoints along the route (m).
+        put_back_ahead: Put back this far ahead of the point of the route nearest to the agent (m), in place of a waypoint; None means
+            a waypoint. Kagioulis et al. (2024) count failures so.
     """
 
     arrival_radius: float = number(0.15, above=0, unit="m")
@@ -41,6 +43,7 @@ class StoppingRules:
     max_steps: int | None = whole(None, optional=True)
     put_back: bool = switch(False)
     waypoint_spacing: float = number(0.1, above=0, unit="m")
+    put_back_ahead: float | None = number(None, low=0, unit="m", optional=True)
 
     def step_limit(self, route_length: float, step_length: float) -> int:
         """The number of steps after which a walk along a route of some length (m) ends."""

@@ -182,6 +182,8 @@ class LearningOptions(SourceOptions):
     """Learn every N-th route view."""
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
+    parallel_views: int = default(TrainingSetup, "parallel_views")
+    """Learn so many views at each position, spread evenly over the learning walk from side to side and all facing along the route. 0: none."""
     device: str = default(Experiment, "device")
     """Where the model learns and scans: cpu, cuda, or another device of torch's."""
 
@@ -225,6 +227,8 @@ class RunOptions(ModelOptions):
     """stop, or reset: put the agent back on the route at the waypoint after the furthest one reached, and count it."""
     waypoint_m: float = default(StoppingRules, "waypoint_spacing")
     """Distance along the route between these waypoints."""
+    put_back_ahead_m: float | None = default(StoppingRules, "put_back_ahead")
+    """With --on-lost reset: put back this far ahead of the nearest point of the route, in place of a waypoint."""
     arrive_m: float = default(StoppingRules, "arrival_radius")
     """Arrived within this distance of the route's end."""
     lost_m: float = default(StoppingRules, "max_deviation")

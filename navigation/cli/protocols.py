@@ -27,7 +27,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     PROTOCOL: ClassVar[str]
     world: Annotated[str | None, tyro.conf.arg(help=WORLD + " Default: that of the protocol.")] = None
     route: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
-    """A route through that world; give it several times, or several with commas between them. Default: generated routes."""
+    """A route through that world, or a folder of them; give it several times, or several with commas between them. Default: generated routes."""
     worlds: int | None = None
     """Number of generated worlds, or of generated routes through a given world. Default: that of the original."""
     seed: int = 0
@@ -36,6 +36,8 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     """See triangles only from their front, as the original Sussex renderer did."""
     quick: bool = False
     """A first look of some minutes: fewer worlds and starts."""
+    as_published: bool = False
+    """The variant of the protocol that is closest to the original, where it has one."""
     out: Path | None = None
     """Folder for the runs and the report; runs that are finished there are not done again. Default: the protocol's name."""
     overwrite: bool = False
@@ -49,7 +51,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         protocol = self.protocol()
         out = self.out or Path(protocol.name)
         self.check()
-        sweep = self.sweep(protocol)
+        sweep = self.sweep(protocol, out)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
         message(f"{len(sweep)} runs: {sweep}")
@@ -66,7 +68,11 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             raise SettingError(
                 f"{self.PROTOCOL!r} is a {type(protocol).__name__}; give the name of a Protocol (tussock.navigation.studies.protocols)"
             )
-        return protocol
+        if not self.as_published:
+            return protocol
+        if protocol.as_published is None:
+            raise SettingError(f"--as-published: {protocol.name} has no such variant; leave it out")
+        return protocol.as_published
 
     def check(self) -> None:
         """Refuse flags that make no sense, alone or together. Raises SettingError."""
@@ -79,17 +85,20 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         self.chosen_workers()
 
     def routes(self) -> list[Path]:
-        """The given route files."""
+        """The given route files and folders."""
         return [Path(name) for given in self.route for name in given.split(",") if name]
 
-    def sweep(self, protocol: "Protocol") -> "Sweep":
-        """The runs, each checked. Raises SettingError."""
+    def sweep(self, protocol: "Protocol", out: Path) -> "Sweep":
+        """The runs, each checked. Raises InputError. out: Where a world is written that the protocol prepares."""
         from ..studies.protocols import routes_in
+        from ..studies.protocols.protocol import prepared_world, route_files
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
-        routes: list[Change] = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
-        reading = self.reading()
-        if reading != MeshReading():
+        given, reading = self.world or protocol.world, self.reading()
+        files = route_files(self.routes(), protocol.route_names, Path(given) if Path(given).is_file() else None)
+        world = prepared_world(protocol, given, reading, out)
+        routes: list[Change] = routes_in(world, files, seed=self.seed, count=count)
+        if reading != MeshReading() and world == given:
             routes = [{**each, "reading": reading} for each in routes]
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
@@ -105,6 +114,8 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             "Routes": ", ".join(map(str, self.routes())) or f"{count}, generated, {seeds}",
             "Walks": f"{len(sweep):,}",
         }
+        if self.as_published:
+            about["Variant"] = "as published"
         if self.route:
             about["Seed"] = self.seed
         if self.cull_back_faces:

@@ -14,4 +14,6 @@ from .rbm import RBM as RBM
 from .registry import MODELS as MODELS
 from .specs import make_model as make_model
 from .specs import model_spec as model_spec
+from .spike_overlap import SpikeOverlap as SpikeOverlap
 from .visual_compass import VisualCompass as VisualCompass
+from .window_memory import WindowMemory as WindowMemory

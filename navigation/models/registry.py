@@ -12,6 +12,7 @@ MODELS = Registry(
             "visual-compass": "visual_compass:VisualCompass",
             "perfect-memory": "perfect_memory:PerfectMemory",
             "chain": "chain:Chain",
+            "window-memory": "window_memory:WindowMemory",
             "mlp": "mlp:MLP",
             "mlp-rotation": "mlp_rotation:MLPRotation",
             "mlp-mixture": "mlp_mixture:MLPMixture",
@@ -20,6 +21,7 @@ MODELS = Registry(
             "autoencoder": "autoencoder:Autoencoder",
             "infomax": "infomax:Infomax",
             "mushroom-body": "mushroom_body:MushroomBody",
+            "spike-overlap": "spike_overlap:SpikeOverlap",
         }.items()
     },
 )

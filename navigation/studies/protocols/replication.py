@@ -1,6 +1,7 @@
 """Doing a protocol: its runs are a sweep in the folder of its report."""
 
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from ...reports.results import StudyResults
 from ...sweeps.spec import Sweep
 from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
-from .protocol import Item, Protocol, check_models, route_names
+from .protocol import DatabaseProtocol, Item, Protocol, check_models, route_names
 
 SUMMARY = (
     "What the paper claims, the numbers that it gives where it gives any, the numbers obtained here, and whether the claim holds by the "
@@ -81,6 +82,45 @@ def replicate(
     }
 
 
+def measure_images(
+    protocol: DatabaseProtocol,
+    folder: Path,
+    out: Path,
+    *,
+    seed: int,
+    about: dict[str, Any],
+    command: str,
+    progress: Progress = no_progress,
+) -> dict[str, Any]:
+    """Measure what a protocol measures on published images, and write the report.
+
+    Args:
+        protocol: The experiment.
+        folder: Of the images.
+        out: Folder of the report.
+        seed: Of everything random.
+        about: The choices made, for the head of the report.
+        command: Command line that repeats all of it.
+        progress: Called with how much is done, of how much.
+
+    Returns:
+        The result of `tussock replicate`.
+
+    Raises:
+        FileError: The images are missing or damaged.
+    """
+    began = time.perf_counter()
+    results = protocol.measure(folder, seed, progress)
+    outcomes = check_claims(protocol.claims, [results])
+    write_report(_report(protocol, results, outcomes, about=about, left_out={}, command=command), out)
+    return {
+        "report": str(out / REPORT),
+        "results": str(out / RESULTS),
+        "claims": {each.claim.key: {"holds": each.label} for each in outcomes},
+        "seconds": time.perf_counter() - began,
+    }
+
+
 def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame, dict[str, int]]:
     """Read the walks of a protocol from its folder.
 
@@ -90,7 +130,7 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
         out: The folder.
 
     Returns:
-        One row per walk, ordered by model, with the columns of the protocol's `of_walk`; and the number of runs that could not be
+        One row per walk, ordered by model, with the columns of the protocol's `of_walk`, and "spec", the model with its parameters; and the number of runs that could not be
         made, by the reason.
 
     Raises:
@@ -110,7 +150,8 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
     models = list(dict.fromkeys(str(run.model) for run in sweep.experiments))
     check_models(table, models)
     order = table["model"].map({model: k for k, model in enumerate(models)})
-    table = table.iloc[order.argsort(kind="stable")].assign(model=lambda each: each["model"].str.split().str[0])
+    table = table.iloc[order.argsort(kind="stable")].assign(spec=lambda each: each["model"])
+    table["model"] = table["model"].str.split().str[0]
     return table.reset_index(drop=True), {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
 
@@ -120,7 +161,7 @@ def _kind_of(error: str) -> str:
 
 
 def _report(
-    protocol: Protocol,
+    protocol: Protocol | DatabaseProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     *,
@@ -138,7 +179,9 @@ def _report(
         columns=["Parameter", "Published", "Here"],
         rows=[(each.name, each.published, each.here) for each in protocol.parameters],
     )
-    again = Text("Finished runs are in the folder and are not done again. The same command gives the same numbers.")
+    walked = isinstance(protocol, Protocol)
+    kept = "Finished runs are in the folder and are not done again. " if walked else ""
+    again = Text(kept + "The same command gives the same numbers.")
     return Report(
         title=protocol.title,
         lead=protocol.question,
@@ -153,7 +196,7 @@ def _report(
             ),
             Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
         ],
-        footer=f"After {protocol.paper} All numbers are in results.json, every walk is in runs.parquet.",
+        footer=f"After {protocol.paper} All numbers are in results.json" + (", every walk is in runs.parquet." if walked else "."),
         results=_results(protocol, results, outcomes, about=about, left_out=left_out),
     )
 
@@ -167,7 +210,7 @@ def _section(item: Item, table: pd.DataFrame) -> Section:
 
 
 def _results(
-    protocol: Protocol,
+    protocol: Protocol | DatabaseProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     *,
