@@ -12,6 +12,7 @@ from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
 from .figures import boxes
+from .intervals import INTERVALS, intervals
 from .protocol import Item, Parameter, Protocol
 
 PERFECT, CHAIN, WINDOW = "perfect-memory", "chain", "window-memory"
@@ -19,6 +20,7 @@ ADAPTIVE = "adaptive window"
 FIXED = (20, 50, 100)  # views
 SPACING = 0.05  # m, between learned views
 ANGULAR_ERROR, FAIL_COUNT = "mean absolute angular error", "trial-fail count"
+MEASURES = {"mean_error_deg": f"{ANGULAR_ERROR} (°)", "failures": FAIL_COUNT, "deviation_cm": "mean deviation (cm)"}
 NOTE = "We have no numbers of the original."
 
 
@@ -53,6 +55,7 @@ def measure(walks: pd.DataFrame) -> StudyResults:
         tables={
             "by_model": by_model.reset_index(),
             "by_route": by_route.reset_index(),
+            "intervals": intervals(walks, MEASURES),
             "walks": walks[["model", "place", "mean_error_deg", "failures", "arrived", "deviation_cm"]],
         },
         numbers={f"{name}, {model}": value for name in by_model for model, value in by_model[name].items()},
@@ -122,6 +125,7 @@ ITEMS = (
         "angular-error", "Mean absolute angular error", "mean_error_deg", "mean absolute error (degrees)", of="routes"
     ),
     boxes("failures", "Failures", "failures", "failures per route", of="routes"),
+    INTERVALS,
     Item("by-route", "Route by route", "by_route", "One walk per model and route."),
 )
 
