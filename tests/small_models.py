@@ -12,6 +12,7 @@ SMALL = {
     "rbm": {"units": 20, "epochs": 5},
     "autoencoder": {"units": 20, "epochs": 5},
     "mushroom-body": {"columns": 12, "rows": 4, "cells": 300, "inputs": 6, "active": 0.03},
+    "spike-overlap": {"columns": 12, "rows": 4, "cells": 300, "inputs": 6},
 }
 
 
