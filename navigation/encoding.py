@@ -27,7 +27,9 @@ from .feature_mask import FeatureMask
 from .overlap import remark_on_overlap
 
 STEPS = Registry(
-    "encodings", "encoding step", {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *COLOUR_STEPS)}
+    "encodings",
+    "encoding step",
+    {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *COLOUR_STEPS)},
 )
 OLD_NAMES = {"sky-mask": "foreground-mask"}  # of steps; files and people may still use them
 PRESETS = {

@@ -18,7 +18,8 @@ from tussock.world.settings import number
 
 from .encoding_steps import EncodingStep, Images, Views, Visible, check_whole
 
-Planes = Float32[np.ndarray, "n planes h w"]
+Planes = Float32[np.ndarray, "n planes rows columns"]
+Stack = Float32[np.ndarray, "n stacked columns"]  # planes one above the other
 
 HEXAGON = (  # neighbours (row, column) of a pixel in even and in odd rows, which are half a pixel apart
     ((0, -1), (0, 1), (-1, 0), (-1, 1), (1, 0), (1, 1)),
@@ -49,7 +50,7 @@ class Luminance(EncodingStep):
 
     name: ClassVar[str] = "luminance"
 
-    def __call__(self, images: Images) -> Images:
+    def __call__(self, images: Stack) -> Images:
         return _split(images, 2, self.name).mean(axis=1)
 
     def visible(self, mask: Visible) -> Visible:
@@ -62,7 +63,7 @@ class FivePlanes(EncodingStep):
 
     takes_unit_range: ClassVar[bool] = True
 
-    def __call__(self, images: Images) -> Images:
+    def __call__(self, images: Images) -> Stack:
         green, blue = np.moveaxis(_split(images, 2, self.name), 1, 0)
         return _stacked(np.stack(self.planes(green, blue), axis=1).astype(np.float32))
 
@@ -181,7 +182,7 @@ class ArdinPlanes(EncodingStep):
 
     name: ClassVar[str] = "ardin-planes"
 
-    def __call__(self, images: Images) -> Images:
+    def __call__(self, images: Images) -> Stack:
         height, width = images.shape[1:]
         columns = max(1, round(296 / 360 * width / ARDIN_COLUMNS))
         coarse = np.einsum("rh,nhw->nrw", _area_means(ARDIN_ROWS, height), images)
@@ -197,7 +198,7 @@ def _split(images: np.ndarray, planes: int, name: str) -> np.ndarray:
     return images.reshape(n, planes, rows // planes, width)
 
 
-def _stacked(planes: Planes) -> Images:
+def _stacked(planes: Planes) -> Stack:
     """Planes (n, planes, h, w) one above the other."""
     n, count, height, width = planes.shape
     return np.ascontiguousarray(planes.reshape(n, count * height, width))

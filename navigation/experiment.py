@@ -117,7 +117,9 @@ class Experiment(Surroundings):
         super().__attrs_post_init__()
         check_device(self.device)
         if self.route_database is not None and self.training.is_of_worlds:
-            raise SettingError("--spacing-m and --parallel-views are of worlds; an image database has its views: give --every instead")
+            raise SettingError(
+                "--spacing-m and --parallel-views are of worlds; an image database has its views: give --every instead"
+            )
         if isinstance(self.model, Spec):
             model = self.make_model()  # refuses bad parameters
             if not isinstance(model, FamiliarityModel):

@@ -42,10 +42,9 @@ class StopCheck:
     def put_back(self) -> Pose:
         """Go on from where the rules say; its pose."""
         spacing, ahead = self.stopping.waypoint_spacing, self.stopping.put_back_ahead
-        if ahead is None:
-            target = (np.floor(self.furthest / spacing + 1e-9) + 1) * spacing
-        else:
-            target = max(self.along, self.resumed) + ahead  # never behind where it was put back before
+        waypoint = (np.floor(self.furthest / spacing + 1e-9) + 1) * spacing
+        # Never behind where it was put back before.
+        target = waypoint if ahead is None else max(self.along, self.resumed) + ahead
         self.furthest = self.resumed = min(target, self.route.length)
         self.since = 0.0
         return Pose(*self.route.at(self.furthest)[0].tolist())

@@ -1,6 +1,7 @@
 """knight2019 on a made database in the published format: its numbers by plain loops, and what it refuses."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -64,7 +65,10 @@ def database(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("square")
     random = np.random.default_rng(3)
     line = [(0.3 * k, 0.0, 0.0) for k in range(10)] + [(3.0, 0.25 * k, 90.0) for k in range(9)]
-    route = [(x + dx, y + dy, heading) for (x, y, heading), (dx, dy) in zip(line, random.uniform(-0.02, 0.02, (19, 2)), strict=True)]
+    route = [
+        (x + dx, y + dy, heading)
+        for (x, y, heading), (dx, dy) in zip(line, random.uniform(-0.02, 0.02, (19, 2)), strict=True)
+    ]
     write_images(folder / "routes" / "route1" / "mask", route)
     (folder / "routes" / "route1" / "decimate.sh").write_text("DECIMATE_DISTANCE=30\n")
     places = [(1.2 * i - 3.6, 1.2 * j - 3.6, -90.0) for i in range(9) for j in range(9)]
@@ -79,7 +83,10 @@ def reduced(folder: Path) -> list[np.ndarray]:
 
 
 def poses(folder: Path) -> list[list[float]]:
-    return [list(map(float, line.split(", ")[:4])) for line in (folder / "database_entries.csv").read_text().splitlines()[1:]]
+    return [
+        list(map(float, line.split(", ")[:4]))
+        for line in (folder / "database_entries.csv").read_text().splitlines()[1:]
+    ]
 
 
 def wrapped(degrees: float) -> float:
@@ -92,7 +99,7 @@ def by_loops(folder: Path, corners: list[tuple[float, float]], within: float | N
     learned, errors = reduced(route), []
     for image, (x, y, _, heading) in zip(reduced(grid), poses(grid), strict=True):
         best = None
-        for (ax, ay), (bx, by) in zip(corners, corners[1:], strict=False):
+        for (ax, ay), (bx, by) in pairwise(corners):
             along = np.array([bx - ax, by - ay])
             share = np.clip(np.dot([x / 1000 - ax, y / 1000 - ay], along) / np.dot(along, along), 0, 1)
             away = np.hypot(*(np.array([x / 1000, y / 1000]) - [ax, ay] - share * along))
@@ -125,7 +132,9 @@ def test_errors_are_those_of_plain_loops(database):
         count, error = by_loops(database, corners, within)
         assert (row["positions"], row["obtained"]) == (count, pytest.approx(error, abs=1e-9))
         assert row["low"] <= row["obtained"] <= row["high"]
-    assert table["obtained"].notna().sum() == results.numbers["errors obtained"] == 8  # mask, and the horizon made of it
+    assert (
+        table["obtained"].notna().sum() == results.numbers["errors obtained"] == 8
+    )  # mask, and the horizon made of it
     assert len(table) == results.numbers["errors published"] == 96
 
 
@@ -193,7 +202,9 @@ def test_pointers_of_git_lfs_are_one_line(database, tmp_path, capfd):
     write_images(route, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
     write_images(tmp_path / "square" / "image_grids" / "mid_day" / "mask", [(0.0, 0.0, -90.0)], grid=True)
     (route / "image_1.png").write_text(POINTER)
-    code, _, err = tussock(capfd, "replicate", "knight2019", "--database", tmp_path / "square", "--out", tmp_path / "out")
+    code, _, err = tussock(
+        capfd, "replicate", "knight2019", "--database", tmp_path / "square", "--out", tmp_path / "out"
+    )
     assert code == 2
     lines = [line for line in err.splitlines() if line.startswith("tussock:")]
     assert len(lines) == 1

@@ -56,13 +56,15 @@ def test_the_window_is_that_of_the_rule_by_loops(window, adaptive):
     assert following.progress is None
     sizes = []
     for k in [*range(0, 60, 3), 59, 59, 20, 0]:
-        view = np.roll(VIEWS[k] + random.normal(scale=random.choice([0.01, 0.5]), size=(4, 12)), -2, axis=1).astype(np.float32)
+        view = np.roll(VIEWS[k] + random.normal(scale=random.choice([0.01, 0.5]), size=(4, 12)), -2, axis=1).astype(
+            np.float32
+        )
         following.look(torch.from_numpy(view), EVERYWHERE)
         assert following.matched == plain.look(view)
         assert (following.window.start, following.window.stop) == (plain.first, plain.last)
         assert following.progress == following.matched / 59
         sizes.append(following.size)
-    assert (len(set(sizes)) > 2) == (adaptive and window < 60)
+    assert (len(set(sizes)) > 1) == adaptive
 
 
 def test_only_the_window_is_compared_and_it_moves_where_the_walk_is_put_back():

@@ -183,7 +183,7 @@ class LearningOptions(SourceOptions):
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
     parallel_views: int = default(TrainingSetup, "parallel_views")
-    """Learn so many views at each position, spread evenly over the learning walk from side to side and all facing along the route. 0: none."""
+    """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
     device: str = default(Experiment, "device")
     """Where the model learns and scans: cpu, cuda, or another device of torch's."""
 

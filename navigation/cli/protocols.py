@@ -27,7 +27,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     PROTOCOL: ClassVar[str]
     world: Annotated[str | None, tyro.conf.arg(help=WORLD + " Default: that of the protocol.")] = None
     route: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
-    """A route through that world, or a folder of them; give it several times, or several with commas between them. Default: generated routes."""
+    """A route through that world, or a folder of routes; give it several times, or with commas in between. Default: generated routes."""
     worlds: int | None = None
     """Number of generated worlds, or of generated routes through a given world. Default: that of the original."""
     seed: int = 0

@@ -34,8 +34,19 @@ class Knight2019Command(Command):
         check_report_folder(self.out, about, overwrite=self.overwrite)
         message(f"{len(present_sets(self.database))} of 24 sets of images")
         given = flags_of(self, type(self), leave_out=("database", "out", "overwrite", "json"))
-        words = ["tussock replicate knight2019 --database", shlex.quote(str(self.database)), given, f"--out {shlex.quote(str(self.out))}"]
+        words = [
+            "tussock replicate knight2019 --database",
+            shlex.quote(str(self.database)),
+            given,
+            f"--out {shlex.quote(str(self.out))}",
+        ]
         with progress("comparing", "sets", verbose=True) as report:
             return measure_images(
-                KNIGHT2019, self.database, self.out, seed=self.seed, about=about, command=" ".join(filter(None, words)), progress=report
+                KNIGHT2019,
+                self.database,
+                self.out,
+                seed=self.seed,
+                about=about,
+                command=" ".join(filter(None, words)),
+                progress=report,
             )

@@ -1,6 +1,7 @@
 """Spike overlap: the Kenyon cells that fire first are the code of a view, and the code of every learned view is kept."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -72,7 +73,9 @@ class SpikeOverlap(IncrementalModel):
         for fields, part in zip(self._fields(), self._parts(), strict=True):
             wiring = learned["wiring"][part]
             if len(wiring) and not 0 <= int(wiring.min()) <= int(wiring.max()) < fields:
-                raise SettingError(f"{self.name}: cells are wired to fields {wiring.min()} to {wiring.max()} of {fields}")
+                raise SettingError(
+                    f"{self.name}: cells are wired to fields {wiring.min()} to {wiring.max()} of {fields}"
+                )
 
     def _begin(self, height: int, width: int) -> Learned:
         random, fields = self._random(), self._fields()
@@ -140,8 +143,8 @@ class SpikeOverlap(IncrementalModel):
         self, view: Float32[torch.Tensor, "h w"], rotations: np.ndarray
     ) -> Float32[torch.Tensor, "n rows columns"]:
         """Means over the fields of all planes, at some rotations; of what is visible of each field."""
-        (height, width), (over_rows, over_columns, seen) = view.shape, self._pooling(*view.shape)
-        columns = torch.as_tensor((seen - rotations[:, None]) % width, device=view.device)
+        over_rows, over_columns, seen = self._pooling(*view.shape)
+        columns = torch.as_tensor((seen - rotations[:, None]) % view.shape[1], device=view.device)
         if self.mask is None:
             return (over_rows @ view)[:, columns].transpose(0, 1) @ over_columns.T
         turned = torch.stack([view.roll(int(k), dims=1) for k in rotations])
@@ -171,7 +174,7 @@ class SpikeOverlap(IncrementalModel):
     def _parts(self) -> list[slice]:
         """The cells of each stream."""
         ends = [round(self.cells * k / len(self.planes)) for k in range(len(self.planes) + 1)]
-        return [slice(*each) for each in zip(ends, ends[1:], strict=False)]
+        return [slice(*each) for each in pairwise(ends)]
 
 
 def averaging(fields: int, pixels: int) -> Float32[torch.Tensor, "{fields} {pixels}"]:

@@ -80,7 +80,9 @@ def measure(walks: pd.DataFrame) -> StudyResults:
             "by_route": by_route[inputs].reset_index(),
             "walks": walks[kept],
         },
-        numbers={f"{name}, {row['input']}": row[name] for _, row in by_input.iterrows() for name in (COMPLETED, DEVIATION)}
+        numbers={
+            f"{name}, {row['input']}": row[name] for _, row in by_input.iterrows() for name in (COMPLETED, DEVIATION)
+        }
         | {"routes": walks["place"].nunique(), "seeds": walks["seed"].nunique()}
         | {f"p, {row['input']}": row["p (Holm)"] for _, row in differences.iterrows()},
     )
@@ -122,7 +124,17 @@ def _differences(walks: pd.DataFrame, inputs: list[str]) -> pd.DataFrame:
         ours = crossed_interval(paired)
         numbers = (mean, low, high, float(paired.mean()), *ours, p, sign_flip(paired.mean(axis=1)))
         rows.append([name, *numbers])
-    columns = ["input", "published (cm)", "low", "high", "obtained (cm)", "low ", "high ", "p (Holm), published", "p (Holm)"]
+    columns = [
+        "input",
+        "published (cm)",
+        "low",
+        "high",
+        "obtained (cm)",
+        "low ",
+        "high ",
+        "p (Holm), published",
+        "p (Holm)",
+    ]
     table = pd.DataFrame(rows, columns=columns)
     return table.assign(**{"p (Holm)": holm(table["p (Holm)"].to_numpy(float))})
 
@@ -176,7 +188,9 @@ def _no_input_differs(results: StudyResults) -> Decision:
 CLAIMS = (_counts_repeat, _ardin_least, _no_input_differs)
 
 PARAMETERS = (
-    Parameter("Routes", "route 2 of ants 4, 6, 7, 9, 10, 12, 13 and 15 of the Sussex world", "those of them that are given"),
+    Parameter(
+        "Routes", "route 2 of ants 4, 6, 7, 9, 10, 12, 13 and 15 of the Sussex world", "those of them that are given"
+    ),
     Parameter("Wiring", "seeds 19, 31, 43, 59, 71", "the same numbers, of another generator"),
     Parameter("View", "74 x 18 points over 296 x 75 degrees", "every second of 180 columns, 74 of them; 18 rows"),
     Parameter("Views learned", "every 10 cm, 9 from -0.2 to 0.2 m to the side, all along the route", "the same"),
@@ -200,14 +214,29 @@ DIFFERENCES = (
 )
 
 ITEMS = (
-    Item("completed-table", "Completed walks and deviation", "by_input", "Published and obtained. The ends low and high are of the 95 % interval of a crossed "
-         f"bootstrap over routes and seeds; fewer than {MIN_ROUTES} routes have none."),
-    Item("completed", "Published and obtained", "by_input", "Share of walks that were completed, and mean distance from the route; bars are crossed 95 % intervals.",
-         lambda table: beside(table, "input", ((COMPLETED, "share completed"), (DEVIATION, DEVIATION)))),
-    Item("differences", "Differences from ApiaViz", "differences", "Mean deviation less that of ApiaViz, paired by route and seed, with crossed 95 % intervals. p: exact "
-         "sign-flip test over routes, with Holm's correction."),
+    Item(
+        "completed-table",
+        "Completed walks and deviation",
+        "by_input",
+        "Published and obtained. The ends low and high are of the 95 % interval of a crossed bootstrap over routes and seeds; fewer than "
+        f"{MIN_ROUTES} routes have none.",
+    ),
+    Item(
+        "completed",
+        "Published and obtained",
+        "by_input",
+        "Share of walks that were completed, and mean distance from the route; bars are crossed 95 % intervals.",
+        lambda table: beside(table, "input", ((COMPLETED, "share completed"), (DEVIATION, DEVIATION))),
+    ),
+    Item(
+        "differences",
+        "Differences from ApiaViz",
+        "differences",
+        "Mean deviation less that of ApiaViz, paired by route and seed, with crossed 95 % intervals. p: exact sign-flip test over routes, "
+        "with Holm's correction.",
+    ),
     Item("by-route", "Deviation by route", "by_route", "Mean over the seeds (cm)."),
-)  # fmt: skip
+)
 
 APIAVIZ2026 = Protocol(
     name="apiaviz2026",

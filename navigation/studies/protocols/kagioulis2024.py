@@ -166,7 +166,9 @@ def _window_lowers_error(results: StudyResults) -> Decision:
     return _lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)", ADAPTIVE)
 
 
-@claim("window-fails-less", "by-model", "the adaptive window has fewer failures per route than perfect memory", note=NOTE)
+@claim(
+    "window-fails-less", "by-model", "the adaptive window has fewer failures per route than perfect memory", note=NOTE
+)
 def _window_fails_less(results: StudyResults) -> Decision:
     """There are fewer failures with an adaptive window than with perfect memory."""
     return _lower(results, FAIL_COUNT, "failures a route", ADAPTIVE)

@@ -51,7 +51,9 @@ def measure(folder: Path, seed: int = 0, progress: Progress = no_progress) -> St
                 headings = best_headings(*differences, tested.facing, direction[near], within)
                 rows.append((route, memory, scan, kind, *_rmse(turn_between(headings, direction[near]))))
     progress(len(present), len(present))
-    return _results(pd.DataFrame(rows, columns=["route", "memory", "scan", "images", "positions", "obtained", "low", "high"]))
+    return _results(
+        pd.DataFrame(rows, columns=["route", "memory", "scan", "images", "positions", "obtained", "low", "high"])
+    )
 
 
 def perfect_memory(learned: Recorded, tested: Recorded, seed: int) -> Differences:
@@ -168,7 +170,9 @@ def _perfect_memory_repeats(results: StudyResults) -> Decision:
     if apart.empty:
         return Decision({"errors obtained": 0.0}, None)
     obtained = {"errors obtained": float(len(apart)), "largest difference (deg)": float(apart.max())}
-    return Decision(obtained | {f"differ by less than {SAME:g} degrees": float((apart < SAME).sum())}, bool((apart < SAME).all()))
+    return Decision(
+        obtained | {f"differ by less than {SAME:g} degrees": float((apart < SAME).sum())}, bool((apart < SAME).all())
+    )
 
 
 @claim(
@@ -204,7 +208,9 @@ def _lower(results: StudyResults, column: str, better: str, worse: str, **chosen
 def _constrained_lower(results: StudyResults) -> Decision:
     """Ignoring headings that are more than 90 degrees away from the route solves visual aliasing."""
     lower, pairs = _lower(results, "scan", CONSTRAINED, FULL)
-    return Decision({"pairs": float(pairs), "not higher within 90 degrees": float(lower)}, lower == pairs if pairs else None)
+    return Decision(
+        {"pairs": float(pairs), "not higher within 90 degrees": float(lower)}, lower == pairs if pairs else None
+    )
 
 
 @claim(
@@ -227,7 +233,9 @@ PARAMETERS = (
     Parameter("Tested", "grid positions within 4 m of the route", "the same"),
     Parameter("Right heading", "that of the nearest segment of the simplified route", "the same"),
     Parameter("Perfect memory", "mean absolute difference, columns of 3 degrees", "the same, in whole numbers"),
-    Parameter("Infomax", "as many units as pixels, one pass", "the same; eta / N = 0.97 / (inputs x units), views in 0..1"),
+    Parameter(
+        "Infomax", "as many units as pixels, one pass", "the same; eta / N = 0.97 / (inputs x units), views in 0..1"
+    ),
     Parameter("Measured", "root-mean-square error (degrees)", "the same; and its bootstrap interval over positions"),
 )
 
@@ -240,17 +248,33 @@ DIFFERENCES = (
 )
 
 ITEMS = (
-    Item("summary", "Errors by memory, scan and images", "summary", "Root-mean-square errors (degrees), mean over the routes that could be obtained."),
-    Item("agreement", "Obtained against published", "errors", "Root-mean-square errors; bars are 95 % bootstrap intervals over positions. On the dotted line both are equal.",
-         lambda table: agreement(table, "memory", "degrees")),
-    Item("errors", "All 96 errors", "errors", "Root-mean-square errors (degrees); low and high are the ends of the 95 % interval."),
-)  # fmt: skip
+    Item(
+        "summary",
+        "Errors by memory, scan and images",
+        "summary",
+        "Root-mean-square errors (degrees), mean over the routes that could be obtained.",
+    ),
+    Item(
+        "agreement",
+        "Obtained against published",
+        "errors",
+        "Root-mean-square errors; bars are 95 % bootstrap intervals over positions. On the dotted line both are equal.",
+        lambda table: agreement(table, "memory", "degrees"),
+    ),
+    Item(
+        "errors",
+        "All 96 errors",
+        "errors",
+        "Root-mean-square errors (degrees); low and high are the ends of the 95 % interval.",
+    ),
+)
 
 KNIGHT2019 = DatabaseProtocol(
     name="knight2019",
     title="Outdoor routes from published images: perfect memory and Infomax",
-    paper="Knight JC, Sakhapov D, Domcsek N, Dewar ADM, Graham P, Nowotny T, Philippides A (2019). Insect-inspired visual navigation on-board "
-    "an autonomous robot: real-world routes encoded in a single layer network. Artificial Life Conference Proceedings 31, 60-67.",
+    paper="Knight JC, Sakhapov D, Domcsek N, Dewar ADM, Graham P, Nowotny T, Philippides A (2019). Insect-inspired visual "
+    "navigation on-board an autonomous robot: real-world routes encoded in a single layer network. Artificial Life "
+    "Conference Proceedings 31, 60-67.",
     question="How well are headings recovered around real routes, from the published images?",
     parameters=PARAMETERS,
     differences=DIFFERENCES,

@@ -21,9 +21,7 @@ GRID = Path("image_grids") / "mid_day"
 WIDTH, HEIGHT = 120, 25  # pixels that images are reduced to
 TOLERANCE = 0.15  # m: how far a route is simplified where its folder does not say
 AT_ONCE = 64  # images that are held in full size
-FETCH = (
-    "give a clone of https://github.com/BrainsOnBoard/sussex_library_square_data, after git lfs pull (docs/protocols.md says how)"
-)
+FETCH = "give a clone of https://github.com/BrainsOnBoard/sussex_library_square_data, after git lfs pull (docs/protocols.md says how)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +90,10 @@ def _reduced(database: Database) -> Iterator[UInt8[np.ndarray, "n h w"]]:
     for start in range(0, len(database), AT_ONCE):
         views = database.views(slice(start, start + AT_ONCE))[..., :3]
         yield np.stack(
-            [cv2.resize(cv2.cvtColor(np.ascontiguousarray(view), cv2.COLOR_RGB2GRAY), (WIDTH, HEIGHT)) for view in views]
+            [
+                cv2.resize(cv2.cvtColor(np.ascontiguousarray(view), cv2.COLOR_RGB2GRAY), (WIDTH, HEIGHT))
+                for view in views
+            ]
         )
 
 

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from tussock.world.errors import FileError, SettingError
 from tussock.world.files import read_world, write_world
-from tussock.world.params import is_generated
 from tussock.world.meshes.reading import MeshReading
+from tussock.world.params import is_generated
 from tussock.world.progress import Progress
 from tussock.world.scene import World
 from tussock.world.settings import settings, whole
@@ -218,12 +218,18 @@ def route_files(given: list[Path], names: Sequence[str] = (), world: Path | None
         inside = sorted(each for each in path.iterdir() if each.is_file() and each.suffix.lower() in ROUTE_SUFFIXES)
         inside = [each for each in inside if world is None or not each.samefile(world)]
         if not inside:
-            raise FileError(f"the folder {path} has no route file ({', '.join(ROUTE_SUFFIXES)}); give another, or files")
+            raise FileError(
+                f"the folder {path} has no route file ({', '.join(ROUTE_SUFFIXES)}); give another, or files"
+            )
         published = [each for each in inside if each.stem in names]
         if names and len(published) < len(names):
             taken = published or inside
             log.warning(
-                "%s has %d of the %d published routes; %s are taken", path, len(published), len(names), ", ".join(each.stem for each in taken)
+                "%s has %d of the %d published routes; %s are taken",
+                path,
+                len(published),
+                len(names),
+                ", ".join(each.stem for each in taken),
             )
         files += published or inside
     return files

@@ -130,8 +130,8 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
         out: The folder.
 
     Returns:
-        One row per walk, ordered by model, with the columns of the protocol's `of_walk`, and "spec", the model with its parameters; and the number of runs that could not be
-        made, by the reason.
+        One row per walk, ordered by model, with the columns of the protocol's `of_walk`, and "spec", the model with its parameters;
+        and the number of runs that could not be made, by the reason.
 
     Raises:
         SettingError: There is no walk at all, or none with one of the models.
@@ -196,7 +196,8 @@ def _report(
             ),
             Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
         ],
-        footer=f"After {protocol.paper} All numbers are in results.json" + (", every walk is in runs.parquet." if walked else "."),
+        footer=f"After {protocol.paper} All numbers are in results.json"
+        + (", every walk is in runs.parquet." if walked else "."),
         results=_results(protocol, results, outcomes, about=about, left_out=left_out),
     )
 
