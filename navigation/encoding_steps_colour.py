@@ -186,7 +186,7 @@ class ArdinPlanes(EncodingStep):
         height, width = images.shape[1:]
         columns = max(1, round(296 / 360 * width / ARDIN_COLUMNS))
         coarse = np.einsum("rh,nhw->nrw", _area_means(ARDIN_ROWS, height), images)
-        wide = sum(np.roll(coarse, columns // 2 - k, axis=2) for k in range(columns)) / columns
+        wide = np.mean([np.roll(coarse, columns // 2 - k, axis=2) for k in range(columns)], axis=0)
         return np.concatenate([wide.astype(np.float32)] * 5, axis=1)
 
 

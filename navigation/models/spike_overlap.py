@@ -20,7 +20,7 @@ from .rotations import in_batches
 # The circuit of ApiaViz (2026): a leaky cell with the input 1 + GAIN x drive fires when it reaches 1, after TAU ln(1 + 1 / (GAIN x drive)).
 TAU, DURATION = 10.0, 50.0  # ms
 GAIN = 0.1
-DELAY = 1.0  # ms from the spike that starts the inhibition to its arrival; spikes are counted in bins of 1 ms
+DELAY = 1  # ms from the spike that starts the inhibition to its arrival; spikes are counted in bins of 1 ms
 
 
 @model
@@ -194,7 +194,9 @@ def first_to_fire(drive: Float32[torch.Tensor, "n cells"], active: float) -> Boo
         active: Share of the cells whose spikes start the inhibition.
     """
     count = min(max(1, round(active * drive.shape[1])), drive.shape[1])
+    never = int(DURATION) + 1
     times = TAU * torch.log1p(1 / (GAIN * drive.clamp(min=1e-30)))
-    bins = times.where(drive > 0, torch.inf).ceil()  # ms
-    stop = bins.kthvalue(count, dim=1, keepdim=True).values + DELAY
-    return (bins <= stop) & (bins <= DURATION)
+    bins = times.ceil().clamp(max=never).where(drive > 0, never).long()  # ms
+    spikes = bins.new_zeros(len(drive), never + 1).scatter_add_(1, bins, torch.ones_like(bins))
+    start = (spikes.cumsum(dim=1) < count).sum(dim=1, keepdim=True)  # when so many have fired
+    return (bins <= start + DELAY) & (bins < never)

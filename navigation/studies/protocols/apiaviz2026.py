@@ -209,6 +209,7 @@ DIFFERENCES = (
     "Tussocks are drawn by our renderer, from both sides; the original sorts triangles by distance, and draws the farther ones first.",
     "CLAHE of Ardin's style is that of OpenCV (clip limit 2.56, which is the original's 0.01 of a tile; 10 tiles around the circle), and "
     "pixels of 8 degrees are means, where the original takes bicubic samples.",
+    "A walk that leaves the world ends there; the original's goes on up to 200 steps.",
     "The deviation is the distance from the route's line, in the original that from the nearest learned position.",
     "Of equally familiar headings the first from ahead to the left is taken, in the original the smallest turn.",
 )
