@@ -55,7 +55,7 @@ class SpikeOverlap(IncrementalModel):
     cells: int = whole(8000)
     inputs: int = whole(10)
     active: float = number(0.02825, low=0, high=1)
-    field: float = number(2 * math.pi, above=0, high=2 * math.pi, unit="rad")
+    field: float = number(2 * math.pi, low=math.radians(1), high=2 * math.pi, unit="rad")
     pixel: int = whole(1)
 
     def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
