@@ -244,6 +244,7 @@ DIFFERENCES = (
     "Where the folder has no images of the horizon, they are the means of the columns of `mask`, one row; how the original makes them is "
     "unknown to us.",
     "Routes are simplified as the file decimate.sh of each says, else to 15 cm, the original's default.",
+    "Where a position is nearest to a corner of the route, the segment before it counts; in the original rounding decides.",
     "Intervals draw positions as if they were independent; neighbouring ones are not, so they are rather too narrow.",
 )
 

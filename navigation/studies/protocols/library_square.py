@@ -151,12 +151,13 @@ def nearest_segment(
         corners: Of the line (m).
 
     Returns:
-        Distance from it (m); its number; and its direction (degrees, from x towards y).
+        Distance from it (m); its number, of segments that are as near, as at their common corner, the first one's; and its direction
+        (degrees, from x towards y).
     """
     start, along = corners[:-1], np.diff(corners, axis=0)
     squared = np.maximum((along**2).sum(axis=1), 1e-30)
     share = (((xy[:, None] - start) * along).sum(axis=2) / squared).clip(0, 1)
     distances = np.linalg.norm(xy[:, None] - start - share[..., None] * along, axis=2)
-    number = distances.argmin(axis=1)
+    number = (distances <= distances.min(axis=1, keepdims=True) + 1e-9).argmax(axis=1)
     directions = np.degrees(np.arctan2(along[:, 1], along[:, 0]))
     return distances[np.arange(len(xy)), number], number, directions[number]
