@@ -238,7 +238,8 @@ class RunOptions(ModelOptions):
     max_steps: int | None = None
     """Limit of steps. Default: as many as three times the route's length needs."""
     navigator: str = default(Experiment, "navigator")
-    """What steers: scan turns to the most familiar heading. Parameters may follow the name. One of your own is package.module:Class."""
+    """What steers: scan turns to the most familiar heading, stepped-scan to the most familiar of headings that are a step apart, as in
+    'stepped-scan width_deg=120 step_deg=10'. One of your own is package.module:Class."""
 
 
 def import_used(names: str) -> None:

@@ -100,6 +100,8 @@ def _row_of(name: str, walks: pd.DataFrame) -> dict[str, object]:
     ends = [*crossed_interval(completed), *crossed_interval(deviation)]
     return {
         "input": name,
+        f"completed of {TRIALS}, published": published,
+        "completed walks": int(completed.sum()),
         "walks": completed.size,
         "completed, published": published / TRIALS,
         COMPLETED: float(completed.mean()),
@@ -168,7 +170,7 @@ def _ardin_least(results: StudyResults) -> Decision:
     shares = results.tables["by_input"].set_index("input")[COMPLETED]
     others = float(shares.drop(ARDIN).min())
     obtained = {f"completed, {ARDIN}": float(shares[ARDIN]), "completed, least of the others": others}
-    return Decision(obtained, bool(shares[ARDIN] < others))
+    return Decision(obtained, bool(shares[ARDIN] < others) if _enough(results) else None)
 
 
 @claim(
