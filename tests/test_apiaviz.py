@@ -176,7 +176,9 @@ def spikes_by_loops(drive, active, fires=solved):
 
 
 def test_cells_race_to_fire_as_leaky_integrators_do():
-    drive = torch.tensor([[0.05, 3.03, 2.1, 0.52, -1.0, 0.0, 1.23, 0.81, 2.95, 4.4]])
+    drive = torch.tensor(
+        [[0.05, 3.03, 2.1, 0.52, -1.0, 0.0, 1.23, 0.81, 2.95, 4.4, 3.9, 3.4]]
+    )  # spikes at 12, 13, 14 ms, ..
     for active in (0.1, 0.3, 0.6):
         assert first_to_fire(drive, active)[0].tolist() == spikes_by_loops(drive[0].tolist(), active, integrated)
 
