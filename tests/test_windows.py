@@ -2,18 +2,19 @@
 
 import math
 
-import attrs
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 
+from tussock.navigation.experiment import Experiment
 from tussock.navigation.models import make_model
 from tussock.navigation.reports.claims import check_claims
+from tussock.navigation.steering import Look, Motion
 from tussock.navigation.stop_check import StopCheck
 from tussock.navigation.stopping import StoppingRules
 from tussock.navigation.studies.protocols import KAGIOULIS2024, routes_in
-from tussock.navigation.sweeps.work import draw, learn, walk
+from tussock.render.eye import Eye
 from tussock.world.geometry import Bounds, Pose, Route
 
 VIEWS = np.cumsum(np.random.default_rng(0).normal(size=(60, 4, 12)), axis=0).astype(np.float32)  # like their neighbours
@@ -144,13 +145,38 @@ def test_walks_that_are_all_alike_decide_nothing():
     assert {each.label for each in outcomes} == {"not tested"}
 
 
-def test_a_walk_that_is_put_back_goes_on_with_the_window_there():
-    """Agents that see next to nothing are put back again and again, and still reach the end of the route."""
-    experiment = KAGIOULIS2024.as_published.experiment.replace(
-        world="tiny", route_length=2.0, encoding="grey | resize 20", model="window-memory window=10", threads=1
+class Circling:
+    """A navigator that walks in circles, with a memory that is told where it was put back."""
+
+    def __init__(self):
+        self.resumed: list[float] = []
+
+    def learn(self, views): ...
+
+    def begin(self):
+        return self
+
+    def resume(self, progress: float) -> None:
+        self.resumed.append(progress)
+
+    def decide(self, look: Look, memories) -> Motion:
+        return Motion(turn=np.full(len(look), 0.4))
+
+
+def test_a_walk_that_is_put_back_is_told_where():
+    experiment = Experiment(
+        world="tiny",
+        eye=Eye(width=36, height=8),
+        encoding="grey",
+        route_length=2.0,
+        threads=1,
+        stopping=StoppingRules(put_back=True, put_back_ahead=0.2, max_deviation=0.15, max_steps=60),
     )
-    experiment = experiment.replace(stopping=attrs.evolve(experiment.stopping, max_deviation=0.05))
-    trained = learn(experiment, draw(experiment, experiment.open_world_and_route()))
-    (result,) = walk([experiment], trained)
-    assert result.results["resets"] > 0
-    assert result.results["arrived"]
+    world, route = experiment.open_world_and_route()
+    navigator = Circling()
+    with experiment.open_renderer(world) as renderer:
+        steps = [step for (step,) in experiment.walk(renderer, route).steps(navigator) if step is not None]
+    put_back = [step.along / route.length for step in steps if step.reset is not None]
+    assert len(put_back) > 2
+    assert navigator.resumed == put_back
+    assert (np.diff(put_back) > 0).all()
