@@ -20,8 +20,10 @@ from tussock.world.errors import SettingError
 from tussock.world.registry import Registry
 from tussock.world.specs import signature_of
 
+from .encoding_rounding import Round
 from .encoding_steps import STEPS as BUILTIN
-from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Round, Scale, Views, Visible
+from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views, Visible
+from .encoding_steps_colour import COLOUR_STEPS
 from .encoding_steps_published import STEPS as PUBLISHED
 from .feature_mask import FeatureMask
 from .overlap import remark_on_overlap
@@ -29,7 +31,7 @@ from .overlap import remark_on_overlap
 STEPS = Registry(
     "encodings",
     "encoding step",
-    {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *PUBLISHED)},
+    {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *PUBLISHED, *COLOUR_STEPS)},
 )
 OLD_NAMES = {"sky-mask": "foreground-mask"}  # of steps; files and people may still use them
 PRESETS = {

@@ -21,8 +21,6 @@ Views = UInt8[np.ndarray, "n height width channels"]
 Images = Float32[np.ndarray, "n h w"]
 Visible = Bool[np.ndarray, "_ _"]
 
-LEVELS = 4096  # of the values of a feature image from 0 to 1; a view has 256
-
 
 class EncodingStep(ABC):
     """One step of an encoding. Its parameters are numbers, in the order in which a chain lists them.
@@ -284,24 +282,6 @@ class Normalise(EncodingStep):
     def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
         most = float(np.sqrt(pixels - 1))  # of one pixel that differs from all others
         return -most, most
-
-
-@attrs.frozen
-class Round(PixelStep):
-    """Each value rounded to a multiple of 1 / LEVELS.
-
-    What differs in the last bits from processor to processor goes no further. And in float64, sums of products of such values are
-    exact in any order: where two views differ equally from a third, they do so on every processor.
-    """
-
-    def __call__(self, images: Images) -> Images:
-        levels = images * np.float32(LEVELS)
-        np.rint(levels, out=levels)
-        levels *= np.float32(1 / LEVELS)
-        return levels
-
-    def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
-        return np.floor(low * LEVELS) / LEVELS, np.ceil(high * LEVELS) / LEVELS
 
 
 STEPS = (Grey, ForegroundMask, Blur, Resize, Sample, Widen, Scale, Invert, Clahe, VerticalEdges, Normalise)

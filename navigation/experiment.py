@@ -116,8 +116,10 @@ class Experiment(Surroundings):
 
         super().__attrs_post_init__()
         check_device(self.device)
-        if self.route_database is not None and self.training.spacing != TrainingSetup().spacing:
-            raise SettingError("--spacing-m is of worlds; an image database has its own views: give --every instead")
+        if self.route_database is not None and self.training.is_of_worlds:
+            raise SettingError(
+                "--spacing-m and --parallel-views are of worlds; an image database has its views: give --every instead"
+            )
         if isinstance(self.model, Spec):
             model = self.make_model()  # refuses bad parameters
             if not isinstance(model, FamiliarityModel):
@@ -215,16 +217,14 @@ class Experiment(Surroundings):
         return draw(self.encoding, renderer, self.training_poses(renderer.world, route), progress)
 
     def training_poses(self, world: "World", route: "Route"):
-        """(n, 3) Poses that views are learned at; see `training_poses` and, for databases, `training_poses_in`."""
-        from .training import training_poses, training_poses_in
+        """(n, 3) Poses that views are learned at; see `poses_of_setup` and, for databases, `training_poses_in`."""
+        from .training import poses_of_setup, training_poses_in
 
         setup = self.training
         if self.route_database is not None:
             beside = self.open_views_beside()[:, :2]
             return training_poses_in(route, beside, every=setup.every, learning_walk=setup.learning_walk)
-        poses = training_poses(
-            route, setup.spacing, every=setup.every, learning_walk=setup.learning_walk, field=world.field
-        )
+        poses = poses_of_setup(setup, route, world.field)
         return poses[world.stands(poses[:, :2])]
 
     def check_matches(self, trained: "TrainedModel") -> None:

@@ -18,7 +18,8 @@ class StopCheck:
 
     def __init__(self, stopping: StoppingRules, route: Route, field: Bounds, step_length: float):
         self.stopping, self.route, self.field, self.step_length = stopping, route, field, step_length
-        self.furthest, self.since, self.along = -np.inf, 0.0, 0.0
+        self.furthest, self.since = -np.inf, 0.0
+        self.along, self.resumed = 0.0, 0.0  # where it is now, and where it was put back last
         self.been_away = not self._at_goal(route.start)  # where the route ends near its start, it must leave first
 
     def check(self, pose: Pose, deviation: float, along: float) -> StopReason | None:
@@ -40,12 +41,15 @@ class StopCheck:
         self.since += share
 
     def put_back(self) -> Pose:
-        """Go on from the waypoint after the furthest point that was reached, or from the nearest point of the route; its pose."""
+        """Go on from where the rules say; its pose."""
+        spacing, ahead = self.stopping.waypoint_spacing, self.stopping.put_back_ahead
         self.since = 0.0
         if self.stopping.put_back_at == "nearest-point":
             return Pose(*self.route.at(self.along)[0].tolist()).rounded()
-        spacing = self.stopping.waypoint_spacing
-        self.furthest = min((np.floor(self.furthest / spacing + 1e-9) + 1) * spacing, self.route.length)
+        waypoint = (np.floor(self.furthest / spacing + 1e-9) + 1) * spacing
+        # Never behind where it was put back before.
+        target = waypoint if ahead is None else max(self.along, self.resumed) + ahead
+        self.furthest = self.resumed = min(target, self.route.length)
         return Pose(*self.route.at(self.furthest)[0].tolist()).rounded()
 
     def _at_goal(self, pose: Pose) -> bool:

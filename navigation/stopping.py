@@ -34,6 +34,8 @@ class StoppingRules:
         put_back_at: Where: "next-waypoint" is the waypoint after the furthest one that it reached, "nearest-point" the nearest point of
             the route.
         waypoint_spacing: Distance between waypoints along the route (m).
+        put_back_ahead: Put back this far ahead of the point of the route nearest to the agent (m), in place of a waypoint; None means
+            a waypoint. Kagioulis et al. (2024) count failures so.
     """
 
     arrival_radius: float = number(0.15, above=0, unit="m")
@@ -43,6 +45,7 @@ class StoppingRules:
     put_back: bool = switch(False)
     put_back_at: str = choice("next-waypoint", ("next-waypoint", "nearest-point"))
     waypoint_spacing: float = number(0.1, above=0, unit="m")
+    put_back_ahead: float | None = number(None, low=0, unit="m", optional=True)
 
     def step_limit(self, route_length: float, step_length: float) -> int:
         """The number of steps after which a walk along a route of some length (m) ends."""

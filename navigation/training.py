@@ -18,6 +18,7 @@ from .feature_mask import FeatureMask, seeing
 from .models.base import FamiliarityModel, Images
 from .models.files import TrainedModel
 from .threads import one_torch_thread
+from .training_setup import TrainingSetup
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +31,13 @@ WEAK_CONTRAST = 0.02  # .. and as a share of the median of all views, under whic
 
 
 def training_poses(
-    route: Route, spacing: float, *, every: int = 1, learning_walk: float = 0.0, field: Bounds | None = None
+    route: Route,
+    spacing: float,
+    *,
+    every: int = 1,
+    learning_walk: float = 0.0,
+    parallel: int = 0,
+    field: Bounds | None = None,
 ) -> Float[np.ndarray, "n 3"]:
     """Poses to learn from: along the route, and, with a learning walk, on both sides of it.
 
@@ -42,6 +49,8 @@ def training_poses(
         spacing: Distance between route views (m).
         every: Learn every N-th of these.
         learning_walk: Reach of the learning walk to both sides (m); 0 is training on the route only, as in the thesis.
+        parallel: Number of views at each position that are spread evenly over this reach, from the right to the left of the route, and all
+            face along it; 0: those of the learning walk.
         field: Poses outside of it are left out.
 
     Returns:
@@ -57,6 +66,10 @@ def training_poses(
         return rounded(poses)
     heading = poses[:, 2]
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
+    if parallel:
+        offsets = np.linspace(-learning_walk, learning_walk, parallel) if parallel > 1 else np.zeros(1)
+        together = _abreast(poses, left, offsets)
+        return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
     ahead = views.at(views.arc[::every] + AHEAD)[:, :2]
     batches = []
     for share in SIDES:
@@ -68,6 +81,27 @@ def training_poses(
     together = np.stack(batches, axis=1).reshape(-1, 3)  # in the order of the route
     together = rounded(together)
     return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
+
+
+def poses_of_setup(setup: TrainingSetup, route: Route, field: Bounds | None = None) -> Float[np.ndarray, "n 3"]:
+    """`training_poses` as a setup says."""
+    return training_poses(
+        route,
+        setup.spacing,
+        every=setup.every,
+        learning_walk=setup.learning_walk,
+        parallel=setup.parallel_views,
+        field=field,
+    )
+
+
+def _abreast(
+    poses: Float[np.ndarray, "n 3"], left: Float[np.ndarray, "n 2"], offsets: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, "m 3"]:
+    """Poses moved to the left by offsets (m), those of one position together."""
+    moved = np.repeat(poses[:, None], len(offsets), axis=1)
+    moved[..., :2] += offsets[:, None] * left[:, None]
+    return moved.reshape(-1, 3)
 
 
 def training_poses_in(

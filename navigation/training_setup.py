@@ -14,8 +14,16 @@ class TrainingSetup:
         spacing: Distance between route views (m).
         every: Learn every N-th of these.
         learning_walk: Reach of the learning walk to both sides of the route (m); 0 is training on the route only, as in the thesis.
+        parallel_views: Number of views at each position of the route, spread evenly over the reach of the learning walk from one side to
+            the other, all facing along the route. 0: the views of a learning walk, which face the route ahead.
     """
 
     spacing: float = number(0.04, above=0, unit="m")
     every: int = whole(1)
     learning_walk: float = number(0.2, low=0, unit="m")
+    parallel_views: int = whole(0, low=0, high=999)
+
+    @property
+    def is_of_worlds(self) -> bool:
+        """Whether it asks for views that image databases, which have their own, cannot give."""
+        return self.spacing != type(self)().spacing or self.parallel_views > 0

@@ -143,6 +143,10 @@ class Walk:
         """Walk until all have arrived or failed. Each time, a list with the `Step` of each agent, or None if its walk has ended."""
         memories = [navigator.begin() for _ in self.agents]
         while walking := self.walking:
+            for agent in walking:
+                memory = memories[agent.number]
+                if agent.reset is not None and hasattr(memory, "resume"):  # it is told where it was put back
+                    memory.resume(agent.along / self.route.length)
             look = self.look()
             with one_torch_thread():
                 motion = navigator.decide(look, [memories[agent.number] for agent in walking])

@@ -13,6 +13,7 @@ SMALL = {
     "autoencoder": {"units": 20, "epochs": 5},
     "mushroom-body": {"columns": 12, "rows": 4, "cells": 300, "inputs": 6, "active": 0.03},
     "spiking-mushroom-body": {"cells": 300, "inputs": 6, "kenyon_weight": 0.1},
+    "spike-overlap": {"columns": 12, "rows": 4, "cells": 300, "inputs": 6},
 }
 
 

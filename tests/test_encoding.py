@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import random_poses, random_world
 
-from tussock.navigation import encoding_steps
+from tussock.navigation import encoding_rounding
 from tussock.navigation.block_means import block_means
 from tussock.navigation.encoding import PRESETS, Encoding
 from tussock.navigation.encoding_steps import Clahe, Grey, Normalise
@@ -83,7 +83,7 @@ def test_values_are_multiples_of_a_level_and_exact_to_it(views, chain):
     features = encoding(views).numpy()
     assert np.array_equal(features, rounded(features))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(encoding_steps, "LEVELS", 2**20)
+        patch.setattr(encoding_rounding, "LEVELS", 2**20)
         finer = encoding(views).numpy()
     assert np.abs(features - finer).max() < 0.51 / LEVELS
 

@@ -73,6 +73,7 @@ VALUES: dict[str, st.SearchStrategy] = {
     "spacing_m": POSITIVE,
     "every": st.integers(1, 100),
     "learning_walk_m": st.floats(0, 10),
+    "parallel_views": st.integers(0, 20),
     "device": st.just("cpu"),
     "model": st.sampled_from(
         ["perfect-memory", "infomax rate=baddeley units=none", "mushroom-body inputs=10 cells=200", "chain", "random"]
@@ -85,6 +86,7 @@ VALUES: dict[str, st.SearchStrategy] = {
     "scan_about_deg": decimals(-360, 360),
     "on_lost": st.sampled_from(["stop", "reset", "reset-nearest"]),
     "waypoint_m": POSITIVE,
+    "put_back_ahead_m": st.floats(0, 9),
     "arrive_m": POSITIVE,
     "lost_m": POSITIVE,
     "patience_m": POSITIVE,
@@ -232,9 +234,10 @@ OTHER: dict[str, Any] = {
     "top_deg": 50.0, "bottom_deg": -20.0, "field_deg": 270.0, "mask": "mask.png", "cull_back_faces": True,
     "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
     "headings": "bearing", "columns": "x,y", "smooth_m": 0.1,
-    "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "device": "cpu:0",
+    "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "parallel_views": 3,
+    "device": "cpu:0",
     "model": "infomax", "threads": 1, "step_m": 0.1, "offset_m": 0.1, "heading_noise_deg": 5.0, "scan_deg": 90.0, "scan_about_deg": 10.0,
-    "on_lost": "reset", "waypoint_m": 0.2, "arrive_m": 0.1, "lost_m": 0.6, "patience_m": 2.0, "max_steps": 9,
+    "on_lost": "reset", "waypoint_m": 0.2, "put_back_ahead_m": 0.3, "arrive_m": 0.1, "lost_m": 0.6, "patience_m": 2.0, "max_steps": 9,
 }  # fmt: skip
 
 

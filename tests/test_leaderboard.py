@@ -109,9 +109,9 @@ def test_the_digest_depends_on_every_setting_of_a_run(tmp_path):
     cv2.imwrite(str(tmp_path / "mask.png"), np.eye(2, dtype=np.uint8) * 255)
     changes = {
         "size": "60x12", "renderer": "auto", "samples": 2, "eye_height_m": 0.02, "top_deg": 50.0, "bottom_deg": -20.0, "resize": 2.0,
-        "blur": 1.0, "spacing_m": 0.2, "every": 2, "learning_walk_m": 0.0, "device": "cpu:0", "threads": None, "step_m": 0.1,
-        "scan_deg": 90.0, "scan_about_deg": 10.0, "on_lost": "reset", "waypoint_m": 0.2, "arrive_m": 0.2, "lost_m": 0.6,
-        "patience_m": 2.0, "max_steps": 9, "field_deg": 270.0, "mask": str(tmp_path / "mask.png"),
+        "blur": 1.0, "spacing_m": 0.2, "every": 2, "learning_walk_m": 0.0, "parallel_views": 3, "device": "cpu:0", "threads": None,
+        "step_m": 0.1, "scan_deg": 90.0, "scan_about_deg": 10.0, "on_lost": "reset", "waypoint_m": 0.2, "put_back_ahead_m": 0.3,
+        "arrive_m": 0.2, "lost_m": 0.6, "patience_m": 2.0, "max_steps": 9, "field_deg": 270.0, "mask": str(tmp_path / "mask.png"),
     }  # fmt: skip
     assert set(changes) == set(TYPES) - set(OF_ENTRY) - set(ROUTE_SETTINGS)
     base = settings_of(TINY.base)

@@ -37,6 +37,8 @@ def values(default: Any, metadata: Any) -> st.SearchStrategy:
         return st.booleans()
     if "choices" in metadata:
         return st.sampled_from(metadata["choices"])
+    if isinstance(default, bool):
+        return st.booleans()
     if isinstance(default, tuple):
         return st.lists(values(default[0], metadata), min_size=1, max_size=4).map(tuple)
     low, high = metadata["low"], metadata["high"]

@@ -41,7 +41,7 @@ BASE = Experiment(
 ENCODING = "edges"  # of entries that choose none
 EARLY = {"world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m"}  # as old as the benchmarks
 # Settings newer than the benchmarks: where they are as by default, the digest is as it was before them.
-LATER = {*ROUTE_SETTINGS, "field_deg", "mask"} - EARLY
+LATER = {*ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m"} - EARLY
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
 
 

@@ -42,7 +42,10 @@ COMMANDS: dict[str, Any] = {
     "benchmark": "benchmark:BenchmarkCommand",
     "replicate": (
         "Re-run a published study and write a report to read next to it.",
-        {"thesis": "studies:ThesisCommand"},  # and the protocols: see `commands_for`
+        {
+            "thesis": "studies:ThesisCommand",
+            "knight2019": "published_images:Knight2019Command",
+        },  # and the protocols: see `commands_for`
     ),
     "study": "studies:StudyCommand",
     "database": (

@@ -182,6 +182,8 @@ class LearningOptions(SourceOptions):
     """Learn every N-th route view."""
     learning_walk_m: float = 0.0
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
+    parallel_views: int = default(TrainingSetup, "parallel_views")
+    """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
     device: str = default(Experiment, "device")
     """Where the model learns and scans: cpu, cuda, or another device of torch's."""
 
@@ -226,6 +228,8 @@ class RunOptions(ModelOptions):
     same, at the nearest point of the route."""
     waypoint_m: float = default(StoppingRules, "waypoint_spacing")
     """Distance along the route between these waypoints."""
+    put_back_ahead_m: float | None = default(StoppingRules, "put_back_ahead")
+    """With --on-lost reset: put back this far ahead of the nearest point of the route, in place of a waypoint."""
     arrive_m: float = default(StoppingRules, "arrival_radius")
     """Arrived within this distance of the route's end."""
     lost_m: float = default(StoppingRules, "max_deviation")
@@ -235,7 +239,8 @@ class RunOptions(ModelOptions):
     max_steps: int | None = None
     """Limit of steps. Default: as many as three times the route's length needs."""
     navigator: str = default(Experiment, "navigator")
-    """What steers: scan turns to the most familiar heading. Parameters may follow the name. One of your own is package.module:Class."""
+    """What steers: scan turns to the most familiar heading, stepped-scan to the most familiar of headings that are a step apart, as in
+    'stepped-scan width_deg=120 step_deg=10'. One of your own is package.module:Class."""
 
 
 def import_used(names: str) -> None:

@@ -27,8 +27,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     PROTOCOL: ClassVar[str]
     world: Annotated[str | None, tyro.conf.arg(help=WORLD + " Default: that of the protocol.")] = None
     route: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="FILE")] = ()
-    """A route through that world, or a folder: all files in it with `route` in their names. Give it several times, or several with commas
-    between them. Default: generated routes."""
+    """A route through that world, or a folder of routes; give it several times, or with commas in between. Default: generated routes."""
     worlds: int | None = None
     """Number of generated worlds, or of generated routes through a given world. Default: that of the original."""
     seed: int = 0
@@ -52,10 +51,10 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         protocol = self.protocol()
         out = self.out or Path(protocol.name)
         self.check()
-        sweep = self.sweep(protocol)
+        sweep = self.sweep(protocol, out)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
-        sweep = self.sweep(protocol, out / "routes") if protocol.layout is not None else sweep
+        sweep = self.sweep(protocol, out, written=True) if protocol.layout is not None else sweep
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
             command = self.command(out)
@@ -87,22 +86,32 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         self.chosen_workers()
 
     def routes(self) -> list[Path]:
-        """The given route files. Raises FileError for a folder without any."""
-        from tussock.world.route_files import routes_at
+        """The given route files and folders."""
+        return [Path(name) for given in self.route for name in given.split(",") if name]
 
-        return [path for given in self.route for name in given.split(",") if name for path in routes_at(Path(name))]
+    def sweep(self, protocol: "Protocol", out: Path, *, written: bool = False) -> "Sweep":
+        """The runs, each checked.
 
-    def sweep(self, protocol: "Protocol", laid_out_in: Path | None = None) -> "Sweep":
-        """The runs, each checked; along routes as the protocol lays them out, if a folder for their files is given. Raises SettingError."""
+        Args:
+            protocol: The experiment.
+            out: Where a world is written that the protocol prepares, and routes that it lays out.
+            written: Lay out the routes, in files; else take them as they are.
+
+        Raises:
+            InputError: For settings of which there can be no run.
+        """
         from ..studies.protocols import laid_out, routes_in
+        from ..studies.protocols.protocol import prepared_world, route_files
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
-        routes: list[Change] = routes_in(self.world or protocol.world, self.routes(), seed=self.seed, count=count)
-        reading = self.reading()
-        if reading != MeshReading():
+        given, reading = self.world or protocol.world, self.reading()
+        files = route_files(self.routes(), protocol.route_names, Path(given) if Path(given).is_file() else None)
+        world = prepared_world(protocol, given, reading, out)
+        routes: list[Change] = routes_in(world, files, seed=self.seed, count=count)
+        if reading != MeshReading() and world == given:
             routes = [{**each, "reading": reading} for each in routes]
-        if laid_out_in is not None:
-            routes = laid_out(protocol, routes, laid_out_in)
+        if written:
+            routes = laid_out(protocol, routes, out / "routes")
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:
@@ -117,6 +126,8 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             "Routes": ", ".join(map(str, self.routes())) or f"{count}, generated, {seeds}",
             "Walks": f"{len(sweep):,}",
         }
+        if self.as_published:
+            about["Variant"] = "as published"
         if self.route:
             about["Seed"] = self.seed
         if self.cull_back_faces:

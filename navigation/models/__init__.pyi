@@ -14,5 +14,7 @@ from .rbm import RBM as RBM
 from .registry import MODELS as MODELS
 from .specs import make_model as make_model
 from .specs import model_spec as model_spec
+from .spike_overlap import SpikeOverlap as SpikeOverlap
 from .spiking_mushroom_body import SpikingMushroomBody as SpikingMushroomBody
 from .visual_compass import VisualCompass as VisualCompass
+from .window_memory import WindowMemory as WindowMemory

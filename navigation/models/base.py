@@ -50,12 +50,7 @@ class SnapshotModel(FamiliarityModel, Protocol):
     """A model that keeps views and so can tell which of them it recognised."""
 
     def match(self, views: Images, windows: Windows | None = None) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
-        """`scan`, and the index of the learned view that each rotation resembles most.
-
-        Args:
-            views: (n, h, w)
-            windows: (n, w) Rotations that will be chosen from, which a model may compare more exactly; None means all.
-        """
+        """`scan`, and the index of the learned view that each rotation resembles most. windows: Those that are chosen from; None: all."""
         ...
 
 

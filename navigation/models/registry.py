@@ -12,6 +12,7 @@ MODELS = Registry(
             "visual-compass": "visual_compass:VisualCompass",
             "perfect-memory": "perfect_memory:PerfectMemory",
             "chain": "chain:Chain",
+            "window-memory": "window_memory:WindowMemory",
             "mlp": "mlp:MLP",
             "mlp-rotation": "mlp_rotation:MLPRotation",
             "mlp-mixture": "mlp_mixture:MLPMixture",
@@ -21,6 +22,7 @@ MODELS = Registry(
             "infomax": "infomax:Infomax",
             "mushroom-body": "mushroom_body:MushroomBody",
             "spiking-mushroom-body": "spiking_mushroom_body:SpikingMushroomBody",
+            "spike-overlap": "spike_overlap:SpikeOverlap",
         }.items()
     },
 )

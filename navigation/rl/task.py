@@ -24,7 +24,7 @@ from ..experiment import Experiment
 from ..steering.navigator import Motion
 from ..stopping import StoppingRules, StopReason
 from ..surroundings import GROUNDS, Surroundings
-from ..training import training_poses, training_views
+from ..training import poses_of_setup, training_views
 from ..training_setup import TrainingSetup
 from ..walk import Walk, check_inside
 
@@ -173,13 +173,7 @@ class Courses:
         Encoded views without contrast are left out (see `tussock.navigation.training.training_views`).
         """
         course, given = self[seed], TrainingSetup(**setup)
-        poses = training_poses(
-            course.route,
-            given.spacing,
-            every=given.every,
-            learning_walk=given.learning_walk,
-            field=course.renderer.world.field,
-        )
+        poses = poses_of_setup(given, course.route, course.renderer.world.field)
         poses = poses[course.renderer.world.stands(poses[:, :2])]
         if self.task.chain is None:
             return self.task.encoded(course.renderer.render(poses)), poses

@@ -4,3 +4,4 @@ from .navigator import Navigator as Navigator
 from .navigator import ScanRecord as ScanRecord
 from .registry import NAVIGATORS as NAVIGATORS
 from .scan import Scan as Scan
+from .stepped_scan import SteppedScan as SteppedScan

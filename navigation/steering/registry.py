@@ -2,4 +2,10 @@
 
 from tussock.world.registry import Registry
 
-NAVIGATORS = Registry("navigators", "navigator", {"scan": "tussock.navigation.steering.scan:Scan"})
+_HERE = "tussock.navigation.steering"
+
+NAVIGATORS = Registry(
+    "navigators",
+    "navigator",
+    {"scan": f"{_HERE}.scan:Scan", "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan"},
+)

@@ -1,7 +1,10 @@
+from .apiaviz2026 import APIAVIZ2026 as APIAVIZ2026
 from .ardin2016 import ARDIN2016 as ARDIN2016
 from .azevedo2025 import AZEVEDO2025 as AZEVEDO2025
 from .baddeley2012 import BADDELEY2012 as BADDELEY2012
 from .kagioulis2024 import KAGIOULIS2024 as KAGIOULIS2024
+from .knight2019 import KNIGHT2019 as KNIGHT2019
+from .protocol import DatabaseProtocol as DatabaseProtocol
 from .protocol import Item as Item
 from .protocol import Parameter as Parameter
 from .protocol import Protocol as Protocol

@@ -15,12 +15,18 @@ from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
 from .effects import over_routes
 from .figures import lines_by_model
+from .intervals import INTERVALS, intervals
 from .protocol import Item, Parameter, Protocol
 
 MAX_START, STARTS = 5.5, 45  # m to either side of the route; number of starts from one side to the other
 LENGTH, STEP = 20.0, 0.1  # m
 LAST_PART = 0.05  # share of the route
 MIN_RANK = 0.9  # rank correlation
+MEASURES = {
+    "displacement_m": "mean displacement (m)",
+    "last_displacement_m": "mean displacement, last 5 % (m)",
+    "reached": "share that got to the last 5 %",
+}
 
 
 def of_walk(row: dict[str, Any], steps: pd.DataFrame) -> dict[str, float]:
@@ -40,7 +46,7 @@ def of_walk(row: dict[str, Any], steps: pd.DataFrame) -> dict[str, float]:
 
 def measure(walks: pd.DataFrame) -> StudyResults:
     """Mean displacement by the displacement of the start."""
-    walks = walks.assign(start_m=walks["offset_m"].abs())
+    walks = walks.assign(start_m=walks["offset_m"].abs(), reached=walks["last_displacement_m"].notna().astype(float))
     grouped = walks.groupby("start_m")
     columns = {
         "walks": grouped.size(),
@@ -51,7 +57,7 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     by_start = pd.DataFrame(columns).reset_index().rename(columns={"start_m": "start beside the route (m)"})
     kept = ["model", "place", "start_m", "offset_m", "displacement_m", "last_displacement_m", "steps", "arrived"]
     return StudyResults(
-        tables={"by_start": by_start, "walks": walks[kept]},
+        tables={"by_start": by_start, "intervals": intervals(walks, MEASURES), "walks": walks[kept]},
         numbers={
             "mean displacement (m)": float(walks["displacement_m"].mean()),
             "mean displacement, last 5 % (m)": float(walks["last_displacement_m"].mean()),
@@ -136,6 +142,7 @@ ITEMS = (
         lambda walks: _displacements(walks, "last_displacement_m"),
     ),
     Item("by-start", "Displacement by start", "by_start", "Over all worlds and both sides."),
+    INTERVALS,
 )
 
 AZEVEDO2025 = Protocol(

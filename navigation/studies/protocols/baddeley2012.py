@@ -14,12 +14,14 @@ from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
 from .effects import over_routes
 from .figures import boxes, boxes_by_model
+from .intervals import INTERVALS, intervals
 from .protocol import Item, Parameter, Protocol
 
 PERFECT, INFOMAX, RANDOM = "perfect-memory", "infomax", "random"
 MODELS = (PERFECT, f"{INFOMAX} rate=baddeley", RANDOM)
 MOSTLY = 0.9  # of the walks
 FOLLOWS = f"at least {100 * MOSTLY:g} % of its walks arrive without an error"
+MEASURES = {"flawless": "arrived without an error", "errors": "errors a walk", "deviation_cm": "mean deviation (cm)"}
 NOTE = "Published as figures of paths."
 
 
@@ -43,6 +45,7 @@ def measure(walks: pd.DataFrame) -> StudyResults:
         tables={
             "by_model": by_model.reset_index(),
             "by_route": by_route[list(by_model.index)].reset_index(),
+            "intervals": intervals(walks, MEASURES),
             "walks": walks[kept],
         },
         numbers={f"{name}, {model}": value for name in by_model for model, value in by_model[name].items()},
@@ -122,6 +125,7 @@ ITEMS = (
         "Mean over each walk; median, quartiles, lowest and highest of all walks.",
         lambda walks: boxes_by_model(walks, "deviation_cm", "mean deviation (cm)"),
     ),
+    INTERVALS,
     Item("by-route", "Errors by route", "by_route", "Mean errors per walk, over all starts."),
 )
 

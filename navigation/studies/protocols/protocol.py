@@ -1,5 +1,6 @@
 """What a published experiment is: its runs, its published parameters, and how its numbers follow from the runs."""
 
+import logging
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -10,16 +11,25 @@ import attrs
 import pandas as pd
 from matplotlib.figure import Figure
 
-from tussock.world.errors import SettingError
+from tussock.world.errors import FileError, SettingError
+from tussock.world.files import read_world, write_world
 from tussock.world.geometry import Route
+from tussock.world.meshes.reading import MeshReading
 from tussock.world.params import is_generated
+from tussock.world.progress import Progress
 from tussock.world.route_files import write_route
+from tussock.world.scene import World
 from tussock.world.settings import settings, whole
 
+from ...content import content_of
 from ...experiment import Experiment
 from ...reports.claims import Claim
 from ...reports.results import StudyResults
 from ...sweeps.spec import Change, Sweep
+
+log = logging.getLogger(__name__)
+
+ROUTE_SUFFIXES = (".bin", ".csv", ".txt", ".mat", ".npy")
 
 
 class Parameter(NamedTuple):
@@ -78,6 +88,8 @@ class Protocol:
         of_walk: Computes further columns for a walk, from its row of the table and its steps.
         world: World preset where none is given.
         layout: Makes the route that is learned and walked of each route; None takes the route itself.
+        prepare_world: Makes the world that is walked in of one from a file, as colours where the file has none.
+        route_names: Names of the route files that are taken of a folder of them, without endings; all where there are none.
         as_published: A variant with the procedure of the original in every detail that is known (`--as-published`).
     """
 
@@ -98,6 +110,8 @@ class Protocol:
     of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = lambda row, steps: {}
     world: str = "tussock-field"
     layout: Callable[[Route], Route] | None = None
+    prepare_world: Callable[[World], World] | None = None
+    route_names: Sequence[str] = ()
     as_published: "Protocol | None" = None
 
     def __attrs_post_init__(self) -> None:
@@ -180,3 +194,81 @@ def check_models(walks: pd.DataFrame, models: list[str]) -> None:
     for model in models:
         if model not in set(walks["model"]):
             raise SettingError(f"no walk with {model} could be made; the column error of runs.parquet has the reasons")
+
+
+@settings
+class DatabaseProtocol:
+    """A published experiment on published images, in which nothing walks.
+
+    Attributes:
+        name: As of a `Protocol`, and so are the others that it has as well.
+        title: See there.
+        paper: See there.
+        question: See there.
+        parameters: See there.
+        differences: See there.
+        claims: See there.
+        items: See there.
+        measure: Computes the results from the folder of the images, a seed, and a function that is called with how much is done.
+    """
+
+    name: str
+    title: str
+    paper: str
+    question: str
+    parameters: Sequence[Parameter] = ()
+    differences: Sequence[str] = ()
+    claims: Sequence[Claim] = ()
+    items: Sequence[Item]
+    measure: Callable[[Path, int, Progress], StudyResults]
+
+
+def route_files(given: list[Path], names: Sequence[str] = (), world: Path | None = None) -> list[Path]:
+    """The route files of some paths, each of which is a file or a folder of files.
+
+    Args:
+        given: The paths.
+        names: Names of the files, without endings, that are taken of a folder which has any of them; of another folder all are.
+        world: File of the world, which may be in the same folder.
+
+    Raises:
+        FileError: For a folder without any route file.
+    """
+    files = []
+    for path in given:
+        if not path.is_dir():
+            files.append(path)
+            continue
+        inside = sorted(each for each in path.iterdir() if each.is_file() and each.suffix.lower() in ROUTE_SUFFIXES)
+        inside = [each for each in inside if world is None or not each.samefile(world)]
+        if not inside:
+            raise FileError(
+                f"the folder {path} has no route file ({', '.join(ROUTE_SUFFIXES)}); give another, or files"
+            )
+        published = [each for each in inside if each.stem in names]
+        if names and len(published) < len(names):
+            taken = published or inside
+            log.warning(
+                "%s has %d of the %d published routes; %s are taken",
+                path,
+                len(published),
+                len(names),
+                ", ".join(each.stem for each in taken),
+            )
+        files += published or inside
+    return files
+
+
+def prepared_world(protocol: Protocol, world: str, reading: MeshReading, folder: Path) -> str:
+    """The world that a protocol's agents walk in: a file in the folder, where it prepares the world of a file; else as given."""
+    if protocol.prepare_world is None or is_generated(world):
+        return world
+    read = read_world(world, reading)
+    prepared = protocol.prepare_world(read)
+    if prepared is read:
+        return world
+    path = folder / f"world-{content_of(prepared)[:8]}.glb"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        write_world(prepared, path)
+    return str(path)

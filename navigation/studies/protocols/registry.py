@@ -13,5 +13,6 @@ PROTOCOLS = Registry(
         "baddeley2012": f"{_HERE}.baddeley2012:BADDELEY2012",
         "azevedo2025": f"{_HERE}.azevedo2025:AZEVEDO2025",
         "kagioulis2024": f"{_HERE}.kagioulis2024:KAGIOULIS2024",
+        "apiaviz2026": f"{_HERE}.apiaviz2026:APIAVIZ2026",
     },
 )

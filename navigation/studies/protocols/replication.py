@@ -1,6 +1,7 @@
 """Doing a protocol: its runs are a sweep in the folder of its report."""
 
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from ...sweeps.spec import Sweep
 from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
 from ...sweeps.tables import compared_models, comparison_blocks
-from .protocol import Item, Protocol, check_models, route_names
+from .protocol import DatabaseProtocol, Item, Protocol, check_models, route_names
 
 SUMMARY = (
     "What the paper claims, the numbers that it gives where it gives any, the numbers obtained here, and whether the claim holds by the "
@@ -89,6 +90,47 @@ def replicate(
     }
 
 
+def measure_images(
+    protocol: DatabaseProtocol,
+    folder: Path,
+    out: Path,
+    *,
+    seed: int,
+    about: dict[str, Any],
+    command: str,
+    progress: Progress = no_progress,
+) -> dict[str, Any]:
+    """Measure what a protocol measures on published images, and write the report.
+
+    Args:
+        protocol: The experiment.
+        folder: Of the images.
+        out: Folder of the report.
+        seed: Of everything random.
+        about: The choices made, for the head of the report.
+        command: Command line that repeats all of it.
+        progress: Called with how much is done, of how much.
+
+    Returns:
+        The result of `tussock replicate`.
+
+    Raises:
+        FileError: The images are missing or damaged.
+    """
+    began = time.perf_counter()
+    results = protocol.measure(folder, seed, progress)
+    outcomes = check_claims(protocol.claims, [results], few_units=False)
+    headline = count_outcomes(outcomes) + "."
+    report = _report(protocol, results, outcomes, {}, about=about, left_out={}, command=command, headline=headline)
+    write_report(report, out)
+    return {
+        "report": str(out / REPORT),
+        "results": str(out / RESULTS),
+        "claims": {each.claim.key: {"holds": each.label} for each in outcomes},
+        "seconds": time.perf_counter() - began,
+    }
+
+
 def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame, dict[str, int]]:
     """Read the walks of a protocol from its folder.
 
@@ -130,7 +172,7 @@ def _kind_of(error: str) -> str:
 
 
 def _report(
-    protocol: Protocol,
+    protocol: Protocol | DatabaseProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     compared: dict[str, Any],
@@ -150,7 +192,9 @@ def _report(
         columns=["Parameter", "Published", "Here"],
         rows=[(each.name, each.published, each.here) for each in protocol.parameters],
     )
-    again = Text("Finished runs are in the folder and are not done again. The same command gives the same numbers.")
+    walked = isinstance(protocol, Protocol)
+    kept = "Finished runs are in the folder and are not done again. " if walked else ""
+    again = Text(kept + "The same command gives the same numbers.")
     return Report(
         title=protocol.title,
         lead=protocol.question,
@@ -158,7 +202,11 @@ def _report(
         blocks=[
             Section(title="Does it hold?", anchor="summary", blocks=summary),
             Section(title="Results", anchor="results", blocks=shown),
-            Section(title="Models compared", anchor="models", blocks=comparison_blocks(compared)),
+            *(
+                [Section(title="Models compared", anchor="models", blocks=comparison_blocks(compared))]
+                if compared
+                else []
+            ),
             Section(
                 title="Differences from the original",
                 anchor="differences",
@@ -166,7 +214,8 @@ def _report(
             ),
             Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
         ],
-        footer=f"After {protocol.paper} All numbers are in results.json, every walk is in runs.parquet.",
+        footer=f"After {protocol.paper} All numbers are in results.json"
+        + (", every walk is in runs.parquet." if walked else "."),
         results=_results(protocol, results, outcomes, about=about, left_out=left_out) | compared,
         headline=headline,
     )
@@ -181,7 +230,7 @@ def _section(item: Item, table: pd.DataFrame) -> Section:
 
 
 def _results(
-    protocol: Protocol,
+    protocol: Protocol | DatabaseProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     *,
