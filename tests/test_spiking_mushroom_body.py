@@ -1,4 +1,4 @@
-"""The spiking mushroom body against a plain simulation of every neuron, against Brian2, and against the capacity that the paper derives."""
+"""The spiking mushroom body against a plain simulation of every neuron, and against the capacity that the paper derives."""
 
 import math
 
@@ -240,62 +240,3 @@ def test_capacity_is_that_of_the_paper():
 def test_invalid_parameters_are_refused(change, message):
     with pytest.raises(SettingError, match=message):
         SpikingMushroomBody(**change)
-
-
-def by_brian(model: SpikingMushroomBody, pixels: np.ndarray) -> tuple[list[tuple[int, int]], int]:
-    """Spikes (cell, step) of the Kenyon cells, and the number of those of the output neuron, by the simulator Brian 2."""
-    try:
-        import brian2 as b
-    except Exception as error:  # a release that does not fit this numpy raises other errors, too
-        pytest.skip(f"Brian 2 cannot be used here ({error}); pip install brian2")
-    b.prefs.codegen.target = "numpy"
-    b.defaultclock.dt = b.ms
-    membrane = """dv/dt = (current - v) / tau : 1 (unless refractory)
-                  current = resistance * (shown + mean * held) : 1
-                  s : 1
-                  held : 1 (constant)
-                  shown : 1 (constant)"""
-
-    def group(size: int, synapse_ms: float):
-        # A spike is in the step before the one whose beginning counts here as its time: hence one more step of rest.
-        made = b.NeuronGroup(
-            size, membrane, threshold="v >= threshold", reset="v = 0", method="exact", refractory=(model.refractory_ms + 1) * b.ms,
-            namespace={
-                "tau": model.membrane_ms * b.ms, "resistance": model.membrane_ms / model.capacitance,
-                "threshold": model.threshold_mv,
-                "mean": synapse_ms * (1 - math.exp(-1 / synapse_ms)), "left": math.exp(-1 / synapse_ms),
-            },
-        )  # fmt: skip
-        made.run_regularly("held = 1.0 * s\ns *= left", when="before_groups")
-        return made
-
-    wiring, synapses = model.learned["wiring"].numpy(), model.learned["synapses"].numpy()
-    projection, kenyon = group(len(pixels), 1.0), group(len(wiring), model.kenyon_synapse_ms)
-    output = group(1, model.output_synapse_ms)
-    projection.shown = model.current * math.sqrt(len(pixels) / 360) * pixels / np.linalg.norm(pixels)
-    inward = b.Synapses(projection, kenyon, "w : 1", on_pre="s_post += w")
-    inward.connect(i=wiring.ravel(), j=np.repeat(np.arange(len(wiring)), wiring.shape[1]))
-    inward.w = model.kenyon_weight
-    outward = b.Synapses(kenyon, output, "w : 1", on_pre="s_post += w")
-    outward.connect()
-    outward.w = synapses
-    fired, answered = b.SpikeMonitor(kenyon), b.SpikeMonitor(output)
-    network = b.Network(projection, kenyon, output, inward, outward, fired, answered)
-    network.run(model.presentation_ms * b.ms)
-    projection.shown = 0
-    network.run(model.silence_ms * b.ms)
-    steps = np.rint(np.asarray(fired.t / b.ms)).astype(int)
-    return sorted(zip(np.asarray(fired.i).tolist(), steps.tolist(), strict=True)), int(answered.num_spikes)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("default")
-def test_brian_2_simulates_the_same_spikes():
-    model = SpikingMushroomBody(**TINY, break_ties=False).fit(pictures(3))
-    (view,) = pictures(1, 5)
-    spikes, familiarity = model.spikes(view[None])[0], model.scan(view[None])[0]
-    for k in (0, 7, 12):
-        kenyon, output = by_brian(model, rotated(view)[k])
-        assert [tuple(each) for each in spikes[spikes[:, 0] == k][:, 1:].tolist()] == kenyon
-        assert familiarity[k] == -output
-        assert kenyon

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from ...sweeps.statistics import mean_interval
+from ...intervals import mean_interval
 from .protocol import Item, models_in
 
 
 def intervals(walks: pd.DataFrame, measures: Mapping[str, str]) -> pd.DataFrame:
-    """Mean and 95 % bootstrap interval of some columns, for each model; whole routes are drawn.
+    """Mean and 95 % interval over routes of some columns, for each model.
 
     Args:
         walks: One walk per row, with the columns "model" and "place".
@@ -32,5 +32,5 @@ INTERVALS = Item(
     "intervals",
     "Means and their intervals",
     "intervals",
-    "95 % bootstrap intervals, for which whole routes are drawn, as walks along one route are not independent.",
+    "95 % intervals over routes, as walks along one route are not independent; none from fewer than five routes.",
 )
