@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float32, Int64
 from torch.nn.functional import embedding_bag
 
 from tussock.world.errors import SettingError
+from tussock.world.geometry import turn_of_columns
 from tussock.world.settings import choice, number, whole
 
 from ..threads import in_threads
@@ -25,7 +26,7 @@ BATCH = 128  # views that are learned at once
 GROUP = 64  # cells whose largest drive is found first
 # Parameters with which the model is that of Ardin et al. 2016, but for what docs/models.md says.
 ARDIN2016 = {
-    "overlap_deg": 0.0, "cells": 20_000, "inputs": 10, "active": 0.003, "outputs": 1, "learning": "depression",
+    "overlap_deg": 0.0, "cells": 20_000, "inputs": 10, "active": 0.003, "outputs": 1, "learning": "depression", "traversals": 1,
 }  # fmt: skip
 
 
@@ -53,6 +54,7 @@ class MushroomBody(IncrementalModel):
         outputs: Number of output neurons.
         learning: "contrast" or "depression".
         rate: By contrast: how much a synapse changes for a prediction error of 1.
+        traversals: Passes over the views that are learned together.
         target_deg: By contrast: standard deviation of the headings that count as the view's own (deg).
         depression: By depression: share of its strength that the synapse of a firing cell loses when a view is learned.
         adaptation: Exponent of the contrast; 0 is no adaptation, 1 is complete.
@@ -73,6 +75,7 @@ class MushroomBody(IncrementalModel):
     outputs: int = whole(14)
     learning: str = choice("contrast", ("contrast", "depression"))
     rate: float = number(10.0, low=0, high=1e6)
+    traversals: int = whole(3)
     target_deg: float = number(6.0, low=0.1, high=180, unit="deg")
     depression: float = number(0.8, low=0, high=1)
     adaptation: float = number(0.25, low=0)
@@ -118,12 +121,13 @@ class MushroomBody(IncrementalModel):
     def _add(self, learned: Learned, views: Images) -> Learned:
         wiring, synapses, seen = learned["wiring"], learned["synapses"].clone(), int(learned["seen"])
         fields = self._fields_for(views.shape[1], views.shape[2])
-        for place, firing in enumerate(self._firing_cells(fields, views, wiring), start=seen):
-            output = place % self.outputs
-            if self.learning == "depression":
-                synapses[output, firing[0]] *= 1 - self.depression
-            else:
-                self._contrast(synapses, output, firing)
+        for _ in range(self.traversals):
+            for place, firing in enumerate(self._firing_cells(fields, views, wiring), start=seen):
+                output = place % self.outputs
+                if self.learning == "depression":
+                    synapses[output, firing[0]] *= 1 - self.depression
+                else:
+                    self._contrast(synapses, output, firing)
         return {"wiring": wiring, "synapses": synapses, "seen": learned["seen"] + len(views)}
 
     def _firing_cells(
@@ -175,8 +179,7 @@ class MushroomBody(IncrementalModel):
         self._check_fields(height, width)
         fields = receptive_fields(self.columns, self.rows, height, width)
         if self.overlap_deg:
-            turn = torch.arange(width)
-            fields = fields @ gaussian(width, math.radians(self.overlap_deg))[(turn[:, None] - turn) % width]
+            fields = overlapping(fields, math.radians(self.overlap_deg))
         if self.mask is not None:
             fields = fields * self.mask.visible
             shares = fields.sum(dim=(1, 2))  # of the fields that are visible, 0 to 1
@@ -276,3 +279,15 @@ def receptive_fields(columns: int, rows: int, height: int, width: int) -> Float3
         return (torch.minimum(end, pixel + 1.0) - torch.maximum(begin, pixel * 1.0)).clamp(min=0) / (pixels / fields)
 
     return torch.einsum("ri,cj->rcij", shares(rows, height), shares(columns, width)).reshape(-1, height, width)
+
+
+def overlapping(fields: Float32[torch.Tensor, "neurons h w"], deviation: float) -> Float32[torch.Tensor, "neurons h w"]:
+    """Fields that reach into their neighbours around the circle, by a Gaussian (rad) that ends at three standard deviations.
+
+    It ends so that a field of which a mask leaves nothing but its far tail sees nothing.
+    """
+    width = fields.shape[2]
+    turn = torch.arange(width)
+    within = torch.from_numpy(np.abs(turn_of_columns(turn.numpy(), width)) <= 3 * deviation + 1e-9)
+    reach = gaussian(width, deviation) * within
+    return fields @ (reach / reach.sum())[(turn[:, None] - turn) % width]
