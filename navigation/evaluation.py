@@ -31,7 +31,7 @@ class HeadingErrors:
         headings: (n,) Recovered (rad).
         nearest: (n,) Index of the nearest route view, whose heading is the right one (place recognition, section 4.3.2).
         errors: (n,) Absolute difference between the two (rad, 0..pi).
-        distances: (n,) From the route (m).
+        distances: (n,) From the line through the route views (m).
     """
 
     positions: Float[np.ndarray, "n 2"]

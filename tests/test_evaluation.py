@@ -85,7 +85,8 @@ def test_bands_of_distance_hold_each_position_once(tiny):
     bands = errors.by_distance()
     assert list(bands) == ["0 to 5 cm", "5 to 10 cm", "10 to 15 cm", "15 to 20 cm"]
     for k, band in enumerate(bands.values()):
-        assert len(band) == ((brute > 0.05 * k - 1e-3) & (brute <= 0.05 * (k + 1) - 1e-3)).sum() > 5
+        within = errors.distances <= 0.05 * (k + 1)
+        assert len(band) == (within & (errors.distances > (0.05 * k if k else -1))).sum() > 5
         assert np.allclose(band.errors, np.abs(wrap_angle(band.headings - route.poses[band.nearest, 2])))
     together = np.concatenate([band.positions for band in bands.values()])
     assert sorted(map(tuple, together)) == sorted(map(tuple, positions))

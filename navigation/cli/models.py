@@ -58,6 +58,8 @@ class EvaluateCommand(ModelOptions):
             with progress("recovering headings", "positions") as report:
                 scan = math.radians(self.scan_deg)
                 errors = heading_errors(model, encoding, renderer, views, positions, scan=scan, progress=report)
+        # From the route itself: the line through its views cuts corners.
+        errors = dataclasses.replace(errors, distances=route.nearest(errors.positions)[0])
         return {
             "model": str(model),
             "encoding": str(encoding),

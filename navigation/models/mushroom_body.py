@@ -40,9 +40,9 @@ class MushroomBody(IncrementalModel):
     Familiarity is minus the least output, averaged over neighbouring rotations. Constant memory.
 
     Each view is learned by one of the outputs, one after the other in turn. Learning by "contrast", the agent turns on the spot and
-    sees the view at all rotations: synapses change so that of all outputs at all rotations this one is silent at the view's own
-    heading, by as much as it is not (a prediction error, Bennett et al. 2021). By "depression", the synapses of the cells that fire
-    at the view's own heading are multiplied by 1 - `depression` (Ardin et al. 2016).
+    sees the view at all rotations. Of all outputs at all rotations, only this one shall be silent, and only at the view's own
+    heading; the synapses of the cells that fire change by the error of this prediction (Bennett et al. 2021). By "depression", the
+    synapses of the cells that fire at the view's own heading are multiplied by 1 - `depression` (Ardin et al. 2016).
 
     Attributes:
         columns: Fields around the circle.
@@ -72,7 +72,7 @@ class MushroomBody(IncrementalModel):
     cells: int = whole(5_000)
     inputs: int = whole(40)
     active: float = number(0.03, low=0, high=1)
-    outputs: int = whole(14)
+    outputs: int = whole(7)
     learning: str = choice("contrast", ("contrast", "depression"))
     rate: float = number(10.0, low=0, high=1e6)
     traversals: int = whole(3)
