@@ -47,10 +47,10 @@ class MushroomBody(IncrementalModel):
     Attributes:
         columns: Fields around the circle.
         rows: Fields from top to bottom.
-        overlap_deg: Standard deviation of the Gaussian by which a field reaches into its neighbours around the circle (deg).
         cells: Number of Kenyon cells.
         inputs: Projection neurons per Kenyon cell.
         active: Share of the Kenyon cells that fires.
+        overlap_deg: Standard deviation of the Gaussian by which a field reaches into its neighbours around the circle (deg).
         outputs: Number of output neurons.
         learning: "contrast" or "depression".
         rate: By contrast: how much a synapse changes for a prediction error of 1.
@@ -68,10 +68,10 @@ class MushroomBody(IncrementalModel):
 
     columns: int = whole(36)
     rows: int = whole(10)
-    overlap_deg: float = number(4.0, low=0, high=180, unit="deg")
     cells: int = whole(5_000)
     inputs: int = whole(40)
     active: float = number(0.03, low=0, high=1)
+    overlap_deg: float = number(4.0, low=0, high=180, unit="deg")
     outputs: int = whole(7)
     learning: str = choice("contrast", ("contrast", "depression"))
     rate: float = number(10.0, low=0, high=1e6)
