@@ -1,11 +1,11 @@
 """How well a model recovers headings at positions near a route."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32
+from jaxtyping import Bool, Float, Float32
 
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
@@ -19,6 +19,7 @@ from .scan import best_turn, scan_window
 BATCH = 64  # views rendered, encoded and compared at once
 RECOVERED_DEG = 45.0  # a heading less than this off counts as recovered
 MAX_POSITIONS = 10**6
+BAND = 0.05  # m; width of a band of distances from the route
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,12 +31,21 @@ class HeadingErrors:
         headings: (n,) Recovered (rad).
         nearest: (n,) Index of the nearest route view, whose heading is the right one (place recognition, section 4.3.2).
         errors: (n,) Absolute difference between the two (rad, 0..pi).
+        distances: (n,) From the line through the route views (m).
     """
 
     positions: Float[np.ndarray, "n 2"]
     headings: Float[np.ndarray, " n"]
     nearest: np.ndarray
     errors: Float[np.ndarray, " n"]
+    distances: Float[np.ndarray, " n"]
+
+    def __len__(self) -> int:
+        return len(self.errors)
+
+    def among(self, chosen: Bool[np.ndarray, " n"]) -> "HeadingErrors":
+        """Those at the chosen positions."""
+        return replace(self, **{name: values[chosen] for name, values in vars(self).items()})
 
     @property
     def median_error_deg(self) -> float:
@@ -48,6 +58,20 @@ class HeadingErrors:
     @property
     def share_over_45(self) -> float:
         return float(np.mean(np.degrees(self.errors) > RECOVERED_DEG))
+
+    def summary(self) -> dict[str, float]:
+        """How many positions there are, and their errors, by the names of these numbers. There must be at least one position."""
+        names = ("median_error_deg", "mean_error_deg", "share_over_45")
+        return {"n_positions": len(self), **{name: getattr(self, name) for name in names}}
+
+    def by_distance(self) -> dict[str, "HeadingErrors"]:
+        """Those in each band of distances from the route: "0 to 5 cm", .. A band without positions is left out.
+
+        A distance between two bands belongs to the nearer one.
+        """
+        band = np.ceil(self.distances / BAND - 1e-9).clip(min=1).astype(int)
+        width = round(100 * BAND)
+        return {f"{width * (k - 1)} to {width * k} cm": self.among(band == k) for k in np.unique(band).tolist()}
 
 
 def grid_positions(route: Route, *, grid: float, within: float, field: Bounds) -> Float[np.ndarray, "n 2"]:
@@ -172,4 +196,7 @@ def errors_of_views(
         progress(done, len(poses))
     recovered, nearest = np.concatenate(headings), nearest_view(route, poses[:, :2])
     errors = np.abs(wrap_angle(recovered - route.poses[nearest, 2]))
-    return HeadingErrors(positions=poses[:, :2], headings=recovered, nearest=nearest, errors=errors)
+    distances, _ = route.nearest(poses[:, :2])
+    return HeadingErrors(
+        positions=poses[:, :2], headings=recovered, nearest=nearest, errors=errors, distances=distances
+    )

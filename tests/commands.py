@@ -20,7 +20,8 @@ KEYS = {
     "view": {"view", "width", "height", "renderer"},
     "route": {"route", "length_m", "start", "goal"},
     "evaluate": {
-        "model", "encoding", "n_views", "n_positions", "median_error_deg", "mean_error_deg", "share_over_45", "seconds",
+        "model", "encoding", "n_views", "n_positions", "median_error_deg", "mean_error_deg", "share_over_45", "by_distance", "clearance_m",
+        "with_room", "seconds",
     },
     "train": {"file", "model", "encoding", "n_views", "memory_bytes", "fit_seconds"},
     "compare": {"encoding", "n_views", "n_positions", "n_worlds", "n_walks", "models"},

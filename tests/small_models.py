@@ -11,7 +11,15 @@ SMALL = {
     "adaboost": {"pool": 60, "features": 8, "passes": 2},
     "rbm": {"units": 20, "epochs": 5},
     "autoencoder": {"units": 20, "epochs": 5},
-    "mushroom-body": {"columns": 12, "rows": 4, "cells": 300, "inputs": 6, "active": 0.03},
+    "mushroom-body": {
+        "columns": 12,
+        "rows": 4,
+        "cells": 300,
+        "inputs": 6,
+        "active": 0.03,
+        "outputs": 3,
+        "traversals": 1,
+    },
     "spiking-mushroom-body": {"cells": 300, "inputs": 6, "kenyon_weight": 0.1},
     "spike-overlap": {"columns": 12, "rows": 4, "cells": 300, "inputs": 6},
 }

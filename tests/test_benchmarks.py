@@ -1,5 +1,6 @@
 """Fast and naive versions of the benchmarks give the same results: the naive ones are independent oracles. Jobs are measured right."""
 
+import argparse
 import importlib
 import json
 import subprocess
@@ -13,6 +14,7 @@ import naive
 import numpy as np
 import pytest
 import torch
+from heading_oracle import dense_poses, known_position
 from job_results import compare, compare_numbers
 from scenes import random_poses, random_world, views
 from stages import sitecustomize as stages
@@ -22,6 +24,7 @@ from tussock.navigation import Infomax, PerfectMemory
 from tussock.navigation.models.infomax import infomax_update
 from tussock.navigation.sweeps.store import Finished, Store
 from tussock.render import Eye, open_renderer
+from tussock.world.geometry import Bounds, Route
 
 
 @pytest.mark.parametrize("world", [random_world(seed=8, n=60), blades(300)], ids=["random", "blades"])
@@ -47,6 +50,28 @@ def test_infomax_equals_its_formula_in_numpy():
     expected = naive.infomax_update(weights.numpy(), seen[0].flatten().numpy(), 1e-4)
     infomax_update(weights, seen[0].flatten(), 1e-4)
     assert torch.allclose(weights, torch.tensor(expected, dtype=torch.float32), atol=1e-4)
+
+
+ROUTE = Route.through(np.array([[1.0, 1.0], [2.0, 1.3], [2.5, 2.2]])).resampled(0.05)
+
+
+def test_the_oracle_of_headings_has_seen_all_around_the_route_but_no_tested_position():
+    poses = dense_poses(ROUTE, argparse.Namespace(dense_m=0.04, within_m=0.1), Bounds(0, 0, 10, 10))
+    off = np.abs(poses[:, :2] / 0.2 - np.round(poses[:, :2] / 0.2)) * 0.2
+    assert off.min() > 0.019  # a tested position is a multiple of 0.2 m
+    assert np.hypot(*(poses[:, None, :2] - ROUTE.xy).transpose(2, 0, 1)).min(axis=1).max() < 0.15
+    fine = np.random.default_rng(0).uniform([1, 1], [2.5, 2.2], (300, 2))
+    near = fine[ROUTE.nearest(fine)[0] <= 0.1]
+    assert np.hypot(*(near[:, None] - poses[:, :2]).transpose(2, 0, 1)).min(axis=1).max() <= 0.04 / 2**0.5 + 1e-9
+
+
+def test_the_oracle_that_knows_the_position_compares_with_the_nearest_view_alone():
+    poses, memories = ROUTE.poses[:4], views(4)
+    seen = memories[[1, 1, 2, 0]].roll(3, dims=-1)  # at the second and third position the view that was learned there
+    errors = known_position(memories, poses, seen, ROUTE, poses).errors
+    turn = 3 * 2 * np.pi / memories.shape[2]
+    assert np.allclose(errors[1:3], turn, atol=0.02)
+    assert (np.abs(errors[[0, 3]] - turn) > 0.1).all()
 
 
 def test_the_functions_whose_stages_are_measured_are_there():

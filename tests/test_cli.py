@@ -19,12 +19,15 @@ import trimesh
 from commands import KEYS, TUSSOCK, printed, process, process_json, tussock
 
 from tussock.navigation.cli.main import COMMANDS, main
+from tussock.navigation.evaluation import grid_positions
+from tussock.navigation.experiment import Experiment
 from tussock.navigation.models import MODELS
 from tussock.navigation.models.files import load_model
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.files import read_world, write_world
 from tussock.world.meshes.reading import MeshReading
+from tussock.world.obstacles import clearance
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
@@ -196,6 +199,22 @@ def test_evaluate_recovers_headings(capfd):
     assert code == 0
     assert "median_error_deg" in out
     assert "renderer: cpu" in err
+
+
+def test_evaluate_reports_positions_with_room_and_by_distance(capfd):
+    flags = ["evaluate", *SMALL, "--grid-m", 0.05, "--within-m", 0.1]
+    result = printed(capfd, *flags)
+    numbers = ("n_positions", "median_error_deg", "mean_error_deg", "share_over_45")
+    assert result["by_distance"]["all"] == {name: result[name] for name in numbers}
+    assert list(result["by_distance"]) == ["0 to 5 cm", "5 to 10 cm", "all"]
+    assert result["clearance_m"] == 0.02
+    world, route = Experiment(world="tiny", seed=2).open_world_and_route()
+    room = clearance(world, grid_positions(route, grid=0.05, within=0.1, field=world.field))
+    for metres in (0.0, float(np.median(room)), float(room.max()) + 0.01):
+        with_room = printed(capfd, *flags, "--clearance-m", metres)["with_room"]
+        assert with_room.get("all", {"n_positions": 0})["n_positions"] == (room >= metres).sum()
+        assert (with_room == result["by_distance"]) == (metres == 0)
+    assert with_room == {}
 
 
 @pytest.mark.parametrize(
@@ -389,6 +408,7 @@ BAD = {
     ),
     "an unknown navigator": (["run", *SMALL, "--navigator", "pilot", "--out", "r"], ["'pilot'", "scan"]),
     "a scan of 0 degrees": (["evaluate", *SMALL, "--scan-deg", "0"], ["--scan-deg 0", "360"]),
+    "a clearance of NaN": (["evaluate", *SMALL, "--clearance-m", "nan"], ["--clearance-m nan"]),
     "no spacing": (["evaluate", *SMALL, "--spacing-m", "0"], ["spacing", "0"]),
     "every 0": (["evaluate", *SMALL, "--every", "0"], ["every", "0"]),
     "a learning walk of -1 m": (["run", *SMALL, "--learning-walk-m", "-1", "--out", "r"], ["--learning-walk-m", "-1"]),

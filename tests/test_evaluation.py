@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tussock.navigation.encoding import Encoding
-from tussock.navigation.evaluation import grid_positions, heading_errors, nearest_view
+from tussock.navigation.evaluation import HeadingErrors, grid_positions, heading_errors, nearest_view
 from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.training import train, training_poses
 from tussock.render.eye import Eye
@@ -70,6 +70,41 @@ def test_errors_are_between_the_recovered_and_the_nearest_views_heading(tiny):
     assert result.share_over_45 == (degrees > 45).mean()
     narrow = heading_errors(model, encoding, renderer, route, positions, scan=np.radians(90))
     assert np.degrees(narrow.errors).max() <= 45 + 6
+
+
+def test_bands_of_distance_hold_each_position_once(tiny):
+    renderer, route = tiny
+    encoding = Encoding.parse("grey | resize 3")
+    model = train(PerfectMemory(), encoding, renderer, route.poses).model
+    positions = grid_positions(route, grid=0.1, within=0.2, field=renderer.world.field)
+    errors = heading_errors(model, encoding, renderer, route, positions)
+    segments = np.linspace(0, 1, 101)[:, None, None]
+    points = (route.xy[:-1] + segments * np.diff(route.xy, axis=0)).reshape(-1, 2)
+    brute = np.hypot(*(positions[:, None] - points).transpose(2, 0, 1)).min(axis=1)
+    assert np.allclose(errors.distances, brute, atol=1e-3)
+    bands = errors.by_distance()
+    assert list(bands) == ["0 to 5 cm", "5 to 10 cm", "10 to 15 cm", "15 to 20 cm"]
+    for k, band in enumerate(bands.values()):
+        within = errors.distances <= 0.05 * (k + 1)
+        assert len(band) == (within & (errors.distances > (0.05 * k if k else -1))).sum() > 5
+        assert np.allclose(band.errors, np.abs(wrap_angle(band.headings - route.poses[band.nearest, 2])))
+    together = np.concatenate([band.positions for band in bands.values()])
+    assert sorted(map(tuple, together)) == sorted(map(tuple, positions))
+    total = sum(len(band) * band.mean_error_deg for band in bands.values())
+    assert np.isclose(total / len(errors), errors.mean_error_deg)
+
+
+def test_a_distance_between_two_bands_belongs_to_the_nearer_one():
+    distances = np.array([0.0, 0.05, 0.05 + 1e-6, 0.1, 3 * 0.05, 0.4])
+    n = len(distances)
+    errors = HeadingErrors(
+        positions=np.zeros((n, 2)), headings=np.zeros(n), nearest=np.zeros(n, int), errors=np.arange(n) / 10,
+        distances=distances,
+    )  # fmt: skip
+    bands = {name: band.distances.tolist() for name, band in errors.by_distance().items()}
+    assert bands == {
+        "0 to 5 cm": [0.0, 0.05], "5 to 10 cm": [0.05 + 1e-6, 0.1], "10 to 15 cm": [3 * 0.05], "35 to 40 cm": [0.4]
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["ant1_route1", "ant4_route1"])

@@ -34,7 +34,13 @@ from tussock.world.errors import FileError, SettingError
 from tussock.world.geometry import Pose
 
 NAMES = [*MODELS.builtin, *(OPPONENT + name for name in ("perfect-memory", "mlp", "mushroom-body", "random"))]
-TURNING = {"mlp", "mlp-rotation", "mlp-mixture", "adaboost"}  # they learn turned copies of their views too
+TURNING = {
+    "mlp",
+    "mlp-rotation",
+    "mlp-mixture",
+    "adaboost",
+    "mushroom-body",
+}  # they learn turned copies of their views too
 RMS = {
     "perfect-memory",
     "chain",
@@ -82,7 +88,9 @@ def hidden_at(view: np.ndarray, visible: np.ndarray, normalised: bool, gain: flo
 
 @cache
 def trained(name: str, kind: str, normalised: bool) -> Model:
-    parameters = {"smoothing_deg": 0.0} if name in ("mushroom-body", OPPONENT + "mushroom-body") else {}
+    parameters = (
+        {"smoothing_deg": 0.0, "overlap_deg": 8.0} if name in ("mushroom-body", OPPONENT + "mushroom-body") else {}
+    )
     return small(name, **parameters).see(mask_of(kind, normalised)).fit(0.3 + views(12))
 
 
@@ -114,7 +122,11 @@ def by_brute_force(model: Model, view: np.ndarray, mask: FeatureMask) -> np.ndar
 
 
 def mushroom_body(model: Model, image: np.ndarray, visible: np.ndarray) -> float:
-    fields = receptive_fields(model.columns, model.rows, *visible.shape).numpy() * visible
+    width = visible.shape[1]
+    away = np.minimum(np.arange(width), width - np.arange(width)) * 360 / width
+    reach = np.exp(-0.5 * (away / model.overlap_deg) ** 2) * (away <= 3 * model.overlap_deg)
+    side_by_side = receptive_fields(model.columns, model.rows, *visible.shape).numpy()
+    fields = sum(share * np.roll(side_by_side, k, axis=2) for k, share in enumerate(reach / reach.sum())) * visible
     shares = fields.sum(axis=(1, 2)).reshape(model.rows, model.columns)
     sums = (fields * image).sum(axis=(1, 2)).reshape(model.rows, model.columns)
     averages = np.divide(sums, shares, out=np.zeros_like(sums), where=shares > 0)
@@ -127,7 +139,7 @@ def mushroom_body(model: Model, image: np.ndarray, visible: np.ndarray) -> float
     output /= (contrasts[:, None] + 0.02 * contrasts.max() + 1e-9) ** model.adaptation
     drive = output.ravel()[model.learned["wiring"].numpy()].sum(axis=1)
     firing = np.argsort(-drive, kind="stable")[: model.firing]
-    return -float(model.learned["synapses"].numpy()[firing].mean())
+    return -float(model.learned["synapses"].numpy()[:, firing].mean(axis=1).min())
 
 
 def spike_overlap(model: Model, image: np.ndarray, visible: np.ndarray) -> float:
@@ -177,8 +189,7 @@ def test_what_is_hidden_at_a_rotation_makes_no_difference_there(name, kind, norm
 def test_what_is_hidden_while_learning_is_not_learned(name):
     hidden = torch.from_numpy(~visible_of("180"))
     learned = torch.where(hidden, 9 * views(12, 8), 0.3 + views(12))
-    parameters = {"smoothing_deg": 0.0} if name == "mushroom-body" else {}
-    other = small(name, **parameters).see(mask_of("180", True)).fit(learned)
+    other = small(name).see(mask_of("180", True)).fit(learned)
     model = trained(name, "180", True)
     for key, tensor in model.learned.items():
         assert torch.allclose(other.learned[key].double(), tensor.double(), atol=1e-5)

@@ -409,6 +409,10 @@ BAD_PARAMETERS = [
     ("mushroom-body", "cells", 0),
     ("mushroom-body", "active", -0.1),
     ("mushroom-body", "active", 2.0),
+    ("mushroom-body", "outputs", 0),
+    ("mushroom-body", "learning", "hope"),
+    ("mushroom-body", "rate", -1.0),
+    ("mushroom-body", "target_deg", 0.0),
     ("mushroom-body", "inputs", 361),  # of 360 neurons
 ]
 

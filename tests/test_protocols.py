@@ -22,6 +22,7 @@ from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_settings import settings_of
 from tussock.navigation.models.infomax import RATES
+from tussock.navigation.models.mushroom_body import ARDIN2016 as ARDIN2016_BODY
 from tussock.navigation.reports.claims import check_claims
 from tussock.navigation.stopping import StoppingRules
 from tussock.navigation.studies.protocols import (
@@ -77,6 +78,7 @@ def test_ardin_is_as_published():
     assert sorted(values(runs, "offset_m")) == [-0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25]
     bodies = {str(run.model): run.make_model() for run in runs if run.model.name == "mushroom-body"}.values()
     assert [(each.columns * each.rows, each.cells, each.inputs) for each in bodies] == [(360, 20_000, 10)]
+    assert all(each.parameters.items() >= ARDIN2016_BODY.items() for each in bodies)
     assert {model.split()[0] for model in values(runs, "model")} == {
         "perfect-memory",
         "mushroom-body",

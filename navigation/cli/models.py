@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -15,6 +15,12 @@ from tussock.world.errors import FileError, SettingError
 from ..experiment import MODEL_SUFFIX
 from .options import Command, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
+
+if TYPE_CHECKING:
+    from tussock.world.scene import World
+
+    from ..evaluation import HeadingErrors
+    from ..experiment import Experiment
 
 
 @dataclass
@@ -27,6 +33,8 @@ class EvaluateCommand(ModelOptions):
     """.. within this distance of the route."""
     scan_deg: float = 360.0
     """Width of the scan; under 360 it is centred on the right heading."""
+    clearance_m: float = 0.02
+    """Errors are also given of those positions alone that have room to stand: no obstacle is nearer than this."""
 
     def run(self) -> dict[str, Any]:
         from ..evaluation import heading_errors
@@ -35,6 +43,8 @@ class EvaluateCommand(ModelOptions):
         began = time.perf_counter()
         if not 0 < self.scan_deg <= 360:
             raise SettingError(f"--scan-deg {self.scan_deg:g}: give over 0 and up to 360")
+        if not (math.isfinite(self.clearance_m) and self.clearance_m >= 0):
+            raise SettingError(f"--clearance-m {self.clearance_m:g}: give a finite distance, 0 or more")
         experiment = self.experiment()
         world, route = experiment.open_world_and_route()
         positions = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
@@ -48,16 +58,28 @@ class EvaluateCommand(ModelOptions):
             with progress("recovering headings", "positions") as report:
                 scan = math.radians(self.scan_deg)
                 errors = heading_errors(model, encoding, renderer, views, positions, scan=scan, progress=report)
+        # From the route itself: the line through its views cuts corners.
+        errors = dataclasses.replace(errors, distances=route.nearest(errors.positions)[0])
         return {
             "model": str(model),
             "encoding": str(encoding),
             "n_views": None if trained.poses is None else len(trained.poses),
-            "n_positions": len(positions),
-            "median_error_deg": errors.median_error_deg,
-            "mean_error_deg": errors.mean_error_deg,
-            "share_over_45": errors.share_over_45,
+            **errors.summary(),
+            "by_distance": table_by_distance(errors),
+            "clearance_m": self.clearance_m,
+            "with_room": self._with_room(experiment, world, errors),
             "seconds": time.perf_counter() - began,
         }
+
+    def _with_room(
+        self, experiment: "Experiment", world: "World", errors: "HeadingErrors"
+    ) -> dict[str, dict[str, float]] | None:
+        """The errors at the positions that have room to stand; None for images, which do not show what stands where."""
+        from tussock.world.obstacles import clearance
+
+        if experiment.route_database is not None:
+            return None
+        return table_by_distance(errors.among(clearance(world, errors.positions) >= self.clearance_m))
 
     def settings(self) -> dict[str, Any]:
         """As for all; the scan is of the evaluation, not of a navigator."""
@@ -227,6 +249,12 @@ class PlayCommand(Command):
         from ..recording.playback import play
 
         return play(self.run_folder, web=self.web, screenshot=self.screenshot)
+
+
+def table_by_distance(errors: "HeadingErrors") -> dict[str, dict[str, float]]:
+    """The numbers of heading errors by the distance from the route, and of all; nothing where there are no positions."""
+    bands = errors.by_distance() | ({"all": errors} if len(errors) else {})
+    return {name: band.summary() for name, band in bands.items()}
 
 
 def summary(cls: type) -> str:

@@ -1,5 +1,7 @@
-"""A mushroom body: many sparsely wired Kenyon cells, and one output whose synapses weaken where a view was seen."""
+"""A mushroom body: many sparsely wired Kenyon cells, and a few outputs that are silent where a view was seen."""
 
+import math
+from collections.abc import Iterator
 from typing import Any
 
 import attrs
@@ -9,29 +11,38 @@ from jaxtyping import Bool, Float32, Int64
 from torch.nn.functional import embedding_bag
 
 from tussock.world.errors import SettingError
-from tussock.world.settings import number, whole
+from tussock.world.geometry import turn_of_columns
+from tussock.world.settings import choice, number, whole
 
 from ..threads import in_threads
 from .base import Images, Learned, Scans, Shapes, model
 from .filter_bank import FilterBank
 from .firing import CELLS, largest_drives
 from .incremental import IncrementalModel
-from .rotations import smoothed
+from .rotations import gaussian, smoothed
 
 MAX_NUMBERS = 2**28  # in an array that is made on the way: 1 GB
 BATCH = 128  # views that are learned at once
 GROUP = 64  # cells whose largest drive is found first
+# Parameters with which the model is that of Ardin et al. 2016, but for what docs/models.md says.
+ARDIN2016 = {
+    "overlap_deg": 0.0, "cells": 20_000, "inputs": 10, "active": 0.003, "outputs": 1, "learning": "depression", "traversals": 1,
+}  # fmt: skip
 
 
 @model
 class MushroomBody(IncrementalModel):
-    """Projection neurons, Kenyon cells with few random inputs each, and anti-Hebbian depression of their output synapses.
+    """Projection neurons, Kenyon cells with few random inputs each, and outputs that learn to be silent at what was seen.
 
-    Projection neurons average the view over the fields of a grid of `columns` x `rows`, less the mean at their elevation and divided
-    by the contrast there to the power of `adaptation` (lateral inhibition and gain control). A Kenyon cell sums `inputs` of them;
-    the share `active` of the cells with the largest sums fires. Learning a view multiplies the output synapses of the cells that
-    fire by 1 - `depression`. Familiarity is minus the mean synapse of the cells that fire, averaged over neighbouring rotations.
-    Constant memory.
+    Projection neurons average the view over overlapping fields on a grid of `columns` x `rows`, less the mean at their elevation and
+    divided by the contrast there to the power of `adaptation` (lateral inhibition and gain control). A Kenyon cell sums `inputs` of
+    them; the share `active` of the cells with the largest sums fires. An output is the mean synapse of the cells that fire.
+    Familiarity is minus the least output, averaged over neighbouring rotations. Constant memory.
+
+    Each view is learned by one of the outputs, one after the other in turn. Learning by "contrast", the agent turns on the spot and
+    sees the view at all rotations. Of all outputs at all rotations, only this one shall be silent, and only at the view's own
+    heading; the synapses of the cells that fire change by the error of this prediction (Bennett et al. 2021). By "depression", the
+    synapses of the cells that fire at the view's own heading are multiplied by 1 - `depression` (Ardin et al. 2016).
 
     Attributes:
         columns: Fields around the circle.
@@ -39,21 +50,33 @@ class MushroomBody(IncrementalModel):
         cells: Number of Kenyon cells.
         inputs: Projection neurons per Kenyon cell.
         active: Share of the Kenyon cells that fires.
-        depression: Share of its strength that the synapse of a firing cell loses when a view is learned.
+        overlap_deg: Standard deviation of the Gaussian by which a field reaches into its neighbours around the circle (deg).
+        outputs: Number of output neurons.
+        learning: "contrast" or "depression".
+        rate: By contrast: how much a synapse changes for a prediction error of 1.
+        traversals: Passes over the views that are learned together.
+        target_deg: By contrast: standard deviation of the headings that count as the view's own (deg).
+        depression: By depression: share of its strength that the synapse of a firing cell loses when a view is learned.
         adaptation: Exponent of the contrast; 0 is no adaptation, 1 is complete.
         smoothing_deg: Standard deviation of the Gaussian over neighbouring rotations (deg), for a head that moves to and fro.
     """
 
     name = "mushroom-body"
-    paper = "Ardin et al. 2016"
-    dtypes = {"wiring": torch.int64}  # noqa: RUF012
+    paper = "Ardin et al. 2016; Bennett et al. 2021"
+    dtypes = {"wiring": torch.int64, "seen": torch.int64}  # noqa: RUF012
     takes_mask = True
 
     columns: int = whole(36)
     rows: int = whole(10)
-    cells: int = whole(20_000)
+    cells: int = whole(5_000)
     inputs: int = whole(40)
-    active: float = number(0.003, low=0, high=1)
+    active: float = number(0.03, low=0, high=1)
+    overlap_deg: float = number(4.0, low=0, high=180, unit="deg")
+    outputs: int = whole(7)
+    learning: str = choice("contrast", ("contrast", "depression"))
+    rate: float = number(10.0, low=0, high=1e6)
+    traversals: int = whole(3)
+    target_deg: float = number(6.0, low=0.1, high=180, unit="deg")
     depression: float = number(0.8, low=0, high=1)
     adaptation: float = number(0.25, low=0)
     smoothing_deg: float = number(6.0, low=0, unit="deg")
@@ -62,10 +85,10 @@ class MushroomBody(IncrementalModel):
         neurons = self.columns * self.rows
         if self.inputs > neurons:
             raise SettingError(f"{self.name}: inputs is {self.inputs}, of {neurons} projection neurons; give fewer")
-        if self.cells * neurons > MAX_NUMBERS:
+        if self.cells * max(neurons, self.outputs) > MAX_NUMBERS:
             raise SettingError(
-                f"{self.name}: {self.cells} cells and {neurons} projection neurons (columns x rows) have over {MAX_NUMBERS:,} "
-                "possible connections; give fewer"
+                f"{self.name}: {self.cells} cells, {neurons} projection neurons (columns x rows) and {self.outputs} outputs have "
+                f"over {MAX_NUMBERS:,} possible connections; give fewer"
             )
 
     _grid: tuple[Any, ...] | None = attrs.field(init=False, repr=False, default=None)
@@ -83,26 +106,54 @@ class MushroomBody(IncrementalModel):
             raise SettingError(
                 f"{self.name}: cells are wired to neurons {int(wiring.min())} to {int(wiring.max())} of {neurons}"
             )
+        if int(learned["seen"]) < 0:
+            raise SettingError(f"{self.name}: it has seen {int(learned['seen'])} views")
 
     def _begin(self, height: int, width: int) -> Learned:
         self.__attrs_post_init__()  # its parameters may have been changed one by one
         self._check_fields(height, width)
         neurons = self.columns * self.rows
         wiring = torch.rand(self.cells, neurons, generator=self._random()).topk(self.inputs, dim=1).indices
-        synapses = torch.ones(self.cells, device=self.device)
-        return {"wiring": self._on_device(wiring.sort(dim=1).values), "synapses": synapses}
+        synapses = torch.ones(self.outputs, self.cells, device=self.device)
+        seen = torch.zeros((), dtype=torch.int64, device=self.device)
+        return {"wiring": self._on_device(wiring.sort(dim=1).values), "synapses": synapses, "seen": seen}
 
     def _add(self, learned: Learned, views: Images) -> Learned:
-        synapses = learned["synapses"].clone()
+        wiring, synapses, seen = learned["wiring"], learned["synapses"].clone(), int(learned["seen"])
         fields = self._fields_for(views.shape[1], views.shape[2])
+        for _ in range(self.traversals):
+            for place, firing in enumerate(self._firing_cells(fields, views, wiring), start=seen):
+                output = place % self.outputs
+                if self.learning == "depression":
+                    synapses[output, firing[0]] *= 1 - self.depression
+                else:
+                    self._contrast(synapses, output, firing)
+        return {"wiring": wiring, "synapses": synapses, "seen": learned["seen"] + len(views)}
+
+    def _firing_cells(
+        self, fields: FilterBank, views: Images, wiring: torch.Tensor
+    ) -> Iterator[Int64[torch.Tensor, "n firing"]]:
+        """For each view the Kenyon cells that fire, at all rotations or, for learning by depression, at its own heading only."""
+        if self.learning == "contrast":
+            yield from (self._firing(self._projection(fields, view), wiring) for view in views)
+            return
         for batch in views.split(BATCH):
             unturned = torch.stack([self._projection(fields, view)[:, 0] for view in batch], dim=1)
-            for firing in self._firing(unturned, learned["wiring"]):
-                synapses[firing] *= 1 - self.depression
-        return {"wiring": learned["wiring"], "synapses": synapses}
+            yield from self._firing(unturned, wiring)[:, None]
+
+    def _contrast(
+        self, synapses: Float32[torch.Tensor, "outputs cells"], output: int, firing: Int64[torch.Tensor, "w firing"]
+    ) -> None:
+        """Change the synapses, in place, so that one output is more silent at a view's own heading, and all are less so elsewhere."""
+        width, count = firing.shape
+        wanted = torch.zeros(self.outputs, width, device=firing.device)
+        wanted[output] = gaussian(width, math.radians(self.target_deg)).to(firing.device)
+        shares = torch.softmax(-outputs_of(synapses, firing).flatten(), dim=0).reshape(wanted.shape)
+        change = self.rate * (shares - wanted)
+        synapses.index_add_(1, firing.flatten(), change.repeat_interleave(count, dim=1))
 
     def _shapes(self, height: int, width: int) -> Shapes:
-        return {"wiring": (self.cells, self.inputs), "synapses": (self.cells,)}
+        return {"wiring": (self.cells, self.inputs), "synapses": (self.outputs, self.cells), "seen": ()}
 
     def _learn_more(self, shape: tuple[int, int], views: Images) -> None:
         """The wiring stays as it is, and so does what it needs."""
@@ -111,7 +162,7 @@ class MushroomBody(IncrementalModel):
 
     def _fields_for(self, height: int, width: int) -> FilterBank:
         """The fields of the projection neurons. They are made anew for another grid only."""
-        grid = (self.columns, self.rows, height, width, self.mask)
+        grid = (self.columns, self.rows, self.overlap_deg, height, width, self.mask)
         if self._grid != grid:
             self._grid, self._fields = grid, self._field_bank(height, width)
         return self._fields
@@ -127,6 +178,8 @@ class MushroomBody(IncrementalModel):
         """The fields of the projection neurons, for views of height x width; with a mask, of what is visible of each."""
         self._check_fields(height, width)
         fields = receptive_fields(self.columns, self.rows, height, width)
+        if self.overlap_deg:
+            fields = overlapping(fields, math.radians(self.overlap_deg))
         if self.mask is not None:
             fields = fields * self.mask.visible
             shares = fields.sum(dim=(1, 2))  # of the fields that are visible, 0 to 1
@@ -140,7 +193,7 @@ class MushroomBody(IncrementalModel):
         fields = self._fields_for(views.shape[1], views.shape[2])
         for view in views:
             firing = self._firing(self._projection(fields, view), wiring)
-            scans.append(-synapses[firing].mean(dim=1))
+            scans.append(-outputs_of(synapses, firing).amin(dim=0))
         return smoothed(torch.stack(scans), np.radians(self.smoothing_deg))
 
     def _projection(self, fields: FilterBank, view: Float32[torch.Tensor, "h w"]) -> Float32[torch.Tensor, "neurons w"]:
@@ -183,6 +236,13 @@ class MushroomBody(IncrementalModel):
         return cells
 
 
+def outputs_of(
+    synapses: Float32[torch.Tensor, "outputs cells"], firing: Int64[torch.Tensor, "w firing"]
+) -> Float32[torch.Tensor, "outputs w"]:
+    """The outputs at each rotation: the mean synapse of the cells that fire."""
+    return torch.stack([of_output[firing].mean(dim=1) for of_output in synapses])
+
+
 def largest(drive: Float32[torch.Tensor, "cells n"], count: int) -> Int64[torch.Tensor, "n count"]:
     """The cells with the largest drive, at each of n projections; of cells that tie, the first ones.
 
@@ -219,3 +279,15 @@ def receptive_fields(columns: int, rows: int, height: int, width: int) -> Float3
         return (torch.minimum(end, pixel + 1.0) - torch.maximum(begin, pixel * 1.0)).clamp(min=0) / (pixels / fields)
 
     return torch.einsum("ri,cj->rcij", shares(rows, height), shares(columns, width)).reshape(-1, height, width)
+
+
+def overlapping(fields: Float32[torch.Tensor, "neurons h w"], deviation: float) -> Float32[torch.Tensor, "neurons h w"]:
+    """Fields that reach into their neighbours around the circle, by a Gaussian (rad) that ends at three standard deviations.
+
+    It ends so that a field of which a mask leaves nothing but its far tail sees nothing.
+    """
+    width = fields.shape[2]
+    turn = torch.arange(width)
+    within = torch.from_numpy(np.abs(turn_of_columns(turn.numpy(), width)) <= 3 * deviation + 1e-9)
+    reach = gaussian(width, deviation) * within
+    return fields @ (reach / reach.sum())[(turn[:, None] - turn) % width]

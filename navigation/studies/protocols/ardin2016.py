@@ -17,7 +17,9 @@ from .protocol import Item, Parameter, Protocol, models_in
 
 PERFECT, BODY, INFOMAX, RANDOM = "perfect-memory", "mushroom-body", "infomax", "random"
 NOTE = "Published as box plots only (figure 4D)."
-MODELS = (PERFECT, f"{BODY} inputs=10 cells=20000", f"{INFOMAX} rate=unit-range", RANDOM)
+# As `ARDIN2016` in navigation/models/mushroom_body.py.
+ARDIN = "overlap_deg=0 cells=20000 inputs=10 active=0.003 outputs=1 learning=depression traversals=1"
+MODELS = (PERFECT, f"{BODY} {ARDIN}", f"{INFOMAX} rate=unit-range", RANDOM)
 
 
 def _starts(*displacements: float) -> list[float]:
