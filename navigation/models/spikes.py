@@ -114,12 +114,8 @@ def fire(trains, wiring, currents, highest, cell_neuron):
     Returns:
         (spikes, 3) View, cell and step of each spike, in the order of the cells.
     """
-    neurons, n = trains.shape
-    steps = currents.shape[1]
-    of_neurons = np.empty((neurons, n), np.float32)
-    for neuron in range(neurons):
-        for j in range(n):
-            of_neurons[neuron, j] = highest[trains[neuron, j]]
+    n, steps = trains.shape[1], currents.shape[1]
+    of_neurons = _peaks_of(trains, highest)
     limit = np.float32(cell_neuron.threshold * (1 - MARGIN))
     spikes, count = np.empty((1024, 3), np.int32), 0
     bound, current = np.empty(n, np.float32), np.empty(steps)
@@ -146,13 +142,21 @@ def fire(trains, wiring, currents, highest, cell_neuron):
                 potential = cell_neuron.decay * potential + cell_neuron.gain * current[step]
                 if potential >= cell_neuron.threshold:
                     if count == len(spikes):
-                        longer = np.empty((2 * count, 3), np.int32)
-                        longer[:count] = spikes
-                        spikes = longer
+                        spikes = np.concatenate((spikes, np.empty_like(spikes)))
                     spikes[count, 0], spikes[count, 1], spikes[count, 2] = j, cell, step
                     count += 1
                     potential, resting = 0.0, cell_neuron.refractory
     return spikes[:count].copy()
+
+
+@compiled
+def _peaks_of(trains, highest):
+    """Peak of the train of each projection neuron (neurons, n)."""
+    of_neurons = np.empty(trains.shape, np.float32)
+    for neuron in range(len(trains)):
+        for j in range(trains.shape[1]):
+            of_neurons[neuron, j] = highest[trains[neuron, j]]
+    return of_neurons
 
 
 @compiled
@@ -201,11 +205,8 @@ def learn(spikes, synapses, steps, output, rule):
         output: `Neuron` that the output neuron is.
         rule: `Plasticity`
     """
-    owner = np.empty(len(spikes), np.int64)  # of each spike the number of its cell among those that fire
-    active = 0
-    for k in range(len(spikes)):
-        active += k == 0 or spikes[k, 1] != spikes[k - 1, 1]
-        owner[k] = active - 1
+    owner = _numbers(spikes[:, 1])
+    active = owner[-1] + 1 if len(owner) else 0
     weights, tags, fired = np.zeros(active), np.zeros(active), np.full(active, -np.inf)
     for k in range(len(spikes)):
         weights[owner[k]] = synapses[spikes[k, 1]]
@@ -225,16 +226,14 @@ def learn(spikes, synapses, steps, output, rule):
             if spikes[k, 2] == step:
                 tags[owner[k]] -= np.exp(-(step - output_fired) / rule.timing)
         if potential >= output.threshold:
-            potential, resting = 0.0, output.refractory
+            potential, resting, output_fired = 0.0, output.refractory, step
             count += 1
-            output_fired = step
             for k in range(active):
                 tags[k] -= np.exp(-(step - fired[k]) / rule.timing)
         for k in range(len(spikes)):
             if spikes[k, 2] == step:
                 fired[owner[k]] = step
-        if step == rule.release:
-            dopamine += rule.dopamine
+        dopamine += rule.dopamine * (step == rule.release)
         rest = in_step if step < steps - 1 else 1 / rate
         for k in range(active):
             weights[k] = max(0.0, weights[k] + tags[k] * dopamine * rest)
@@ -243,3 +242,12 @@ def learn(spikes, synapses, steps, output, rule):
     for k in range(len(spikes)):
         synapses[spikes[k, 1]] = weights[owner[k]]
     return count
+
+
+@compiled
+def _numbers(cells):
+    """For each spike the number of its cell among those that fire, from the cells of all spikes in their order."""
+    numbers = np.zeros(len(cells), np.int64)
+    for k in range(1, len(cells)):
+        numbers[k] = numbers[k - 1] + (cells[k] != cells[k - 1])
+    return numbers
