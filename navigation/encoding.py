@@ -82,7 +82,7 @@ class Encoding:
         return images.astype(np.float32, copy=False)
 
     @property
-    def _applied(self) -> tuple[EncodingStep, ...]:
+    def _applied(self) -> tuple[Any, ...]:
         """The steps, and the rounding of what they make of a view: before it is scaled down, so that this loses nothing."""
         last = len(self.steps)
         while isinstance(self.steps[last - 1], Scale):

@@ -39,9 +39,16 @@ def views():
         return renderer.render(random_poses(5))
 
 
+def unrounded(chain, views):
+    """What the steps of an encoding make of views."""
+    for step in Encoding.parse(chain).steps:
+        views = step(views)
+    return views
+
+
 def planes_of(views, name):
     """The five planes (n, 5, h, w) of an input."""
-    images = Encoding.parse(INPUTS[name])(views).numpy()
+    images = unrounded(INPUTS[name], views)
     return images.reshape(len(images), 5, -1, images.shape[2])
 
 
@@ -117,7 +124,7 @@ def test_simple_planes(views):
 
 def test_edges_of_the_control_with_edges(views):
     """Of pixels that are one column apart, against torch."""
-    images = Encoding.parse("green-blue | sobel-planes 1")(views).numpy().reshape(len(views), 5, -1, 60)
+    images = unrounded("green-blue | sobel-planes 1", views).reshape(len(views), 5, -1, 60)
     smooth = convolved(receptors(views).mean(dim=1, keepdim=True), bell(5, 1.0))
     sobel = torch.tensor([[-1.0, 0, 1], [-2, 0, 2], [-1, 0, 1]]) / 8
     x, y = convolved(smooth, sobel)[:, 0].numpy(), convolved(smooth, sobel.T)[:, 0].numpy()
@@ -128,7 +135,7 @@ def test_edges_of_the_control_with_edges(views):
 
 def test_the_planes_of_apiaviz(views):
     """Local adaptation, centre and surround and opponent colours against torch; hexagonal averages have their own test."""
-    images = Encoding.parse("green-blue | apia-planes 1")(views).numpy().reshape(len(views), 5, -1, 60)
+    images = unrounded("green-blue | apia-planes 1", views).reshape(len(views), 5, -1, 60)
     light = receptors(views).numpy()
     green, blue = (torch.from_numpy(_hexagonal(light[:, k].copy(), 1))[:, None] for k in (0, 1))
     mean = (green + blue) / 2

@@ -428,7 +428,7 @@ BAD = {
         ["in/route.csv", "replaced"],
     ),
     "a start outside": (["run", *SMALL, "--offset-m", "50", "--out", "r"], ["outside the world"]),
-    "neither stop nor reset": (["run", *SMALL, "--on-lost", "cry", "--out", "r"], ["'cry'", "stop or reset"]),
+    "neither stop nor reset": (["run", *SMALL, "--on-lost", "cry", "--out", "r"], ["'cry'", "reset or reset-nearest"]),
     "a file for a folder": (["run", *SMALL, "--out", "one.csv"], ["one.csv is a file"]),
     "a folder under a file": (["run", *SMALL, "--out", "one.csv/run"], ["one.csv/run", "cannot be written"]),
     "no viewer to stream to": (

@@ -62,9 +62,10 @@ def test_maps_of_routes_of_any_shape_have_room_for_their_titles(across, up, maps
 @pytest.mark.parametrize("models", [1, 3, 6])
 def test_figures_of_protocols_have_every_model(models):
     rows = [
-        {"model": model, "offset": offset, "errors": 3.0 * number + offset}
+        {"model": model, "offset": offset, "errors": 3.0 * number + offset + 0.2 * place, "place": place}
         for number, model in enumerate(MODELS[:models])
         for offset in (1, 2, 2, 5)
+        for place in range(6)
     ]
     walks = pd.DataFrame(rows)
     lines = lines_by_model(

@@ -288,7 +288,7 @@ REFUSED: list[tuple[str, int | None, list[str]]] = [  # the text, the line that 
     ("[axes]\nseed = { to = 1 }\n", 2, ["range", "from = 0, to = 19"]),
     ("[fixed]\nseed = 3\n[axes]\nseed = [1]\n", 4, ["seed", "fixed", "leave one out"]),
     ("[fixed]\nscan-deg = 400\n[axes]\nseed = [1]\n", 2, ["scan-deg is 400; give", "to 360 (degrees)"]),
-    ("[fixed]\non-lost = 'cry'\n[axes]\nseed = [1]\n", 2, ["'cry'", "stop or reset"]),
+    ("[fixed]\non-lost = 'cry'\n[axes]\nseed = [1]\n", 2, ["'cry'", "reset or reset-nearest"]),
     ("[fixed]\nworld = 'there-is-none.glb'\n[axes]\nseed = [1]\n", 2, ["there-is-none.glb"]),
     ("[axes]\nworld = ['tiny', 'tiny field_width=900']\n", 2, ["'tiny field_width=900'", "field_width", "900"]),
     ("[axes]\nseed = {from=0, to=9999}\noffset-m = {from=0, to=1, count=9999}\n", None, ["99,990,000 runs", "1,000,000"]),

@@ -170,7 +170,7 @@ _PLAIN = Protocol(
 )
 def _window_lowers_error(results: StudyResults) -> Decision:
     """Headings are more accurate when the view is compared only with a window of the sequence that adapts its size."""
-    return _lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)", ADAPTIVE)
+    return _lower(results, f"{ANGULAR_ERROR} (°)", f"{ANGULAR_ERROR} (deg)", "mean_error_deg", ADAPTIVE)
 
 
 @claim(
@@ -178,7 +178,7 @@ def _window_lowers_error(results: StudyResults) -> Decision:
 )
 def _window_fails_less(results: StudyResults) -> Decision:
     """There are fewer failures with an adaptive window than with perfect memory."""
-    return _lower(results, FAIL_COUNT, "failures a route", ADAPTIVE)
+    return _lower(results, FAIL_COUNT, "failures a route", "failures", ADAPTIVE)
 
 
 PARAMETERS_AS_PUBLISHED = (
