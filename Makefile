@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: run test test-slow lint format bench bench-jobs clean
+.PHONY: run test test-slow lint format bench bench-jobs numbers numbers-slow clean
 
 run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, and print how to watch it
 	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
@@ -41,6 +41,12 @@ bench: $(VENV)/developer  ## the benchmarks, into docs/performance.md; run it wh
 
 bench-jobs: $(VENV)/developer  ## whole jobs, next to those of another checkout: BASE=CHECKOUT BASE_PYTHON=its/python OPTIONS="--only run,sweep"
 	$(BIN)/python benchmarks/jobs.py $(if $(BASE),--base $(BASE) --python $(BASE_PYTHON)) --results $(VENV)/jobs.json --docs $(OPTIONS)
+
+numbers: $(VENV)/developer  ## the numbers that README and docs print, measured again and written into the pages: the quick ones
+	$(BIN)/python docs/numbers/make.py
+
+numbers-slow: $(VENV)/developer  ## the others; they take half an hour
+	$(BIN)/python docs/numbers/make.py --slow
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

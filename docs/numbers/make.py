@@ -84,17 +84,14 @@ def written(page: str, kept: Mapping[str, Record]) -> str:
         begin, name, part, _, end = mark.groups()
         return begin + MEASUREMENTS[name].texts[part](kept[name]["values"]) + end
 
-    names = sorted({mark[2] for mark in NUMBER.finditer(page)})
-    lines = [
-        "| numbers | command | commit | processor | day |",
-        "|---|---|---|---|---|",
-        *(
-            f"| {name} | {{command}} | {{commit}} | {{processor}} | {{day}} |".format(**kept[name]["origin"])
-            for name in names
-        ),
-    ]
-    origin = "\n".join(lines) + "\n"
-    return ORIGIN.sub(lambda mark: mark[1] + origin + mark[3], NUMBER.sub(number, page))
+    def origin(mark: re.Match[str]) -> str:
+        lines = ["| numbers | command | commit | processor | day |", "|---|---|---|---|---|"]
+        for name in sorted({number[2] for number in NUMBER.finditer(page)}):
+            made = kept[name]["origin"]
+            lines.append(f"| {name} | {made['command']} | {made['commit']} | {made['processor']} | {made['day']} |")
+        return mark[1] + "\n".join(lines) + "\n" + mark[3]
+
+    return ORIGIN.sub(origin, NUMBER.sub(number, page))
 
 
 def write_pages() -> None:

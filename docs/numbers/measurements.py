@@ -117,22 +117,9 @@ def measure_learning_walks_sussex(folder: Path) -> Values:
 
 def measure_arrivals(folder: Path) -> Values:
     """How many walks of each model arrive in generated worlds."""
-    axes = {"model": MODELS, "seed": seeds(0, 19)}
+    axes = {"model": WALKERS, "seed": seeds(0, 19)}
     table = sweep(folder, "arrivals", {"world": "tussock-field", "offset-m": 0.1}, axes)
     return arrivals(table, "model")
-
-
-def measure_dense_views(folder: Path) -> Values:
-    """The test bed's walks in other worlds, with a view every 4 cm."""
-    fixed = {"size": "360x75", "spacing-m": 0.04, "learning-walk-m": 0.2}
-    axes = {
-        "model": ["perfect-memory", "infomax", "mlp-rotation", "mushroom-body"],
-        "world": ["tussock-field", "meadow", "scrub"],
-        "seed": seeds(900, 902),
-        "heading-noise-deg": [0.0, 20.0, 40.0],
-        "offset-m": [-0.3, 0.3],
-    }
-    return arrivals(sweep(folder, "dense", fixed, axes), "model")
 
 
 def measure_test_bed(folder: Path) -> Values:
@@ -173,6 +160,7 @@ MODELS = [
     "infomax",
     "mushroom-body",
 ]
+WALKERS = ["perfect-memory", "mlp-rotation", "rbm", "infomax", "mushroom-body"]  # of whose walks README tells
 MEASUREMENTS = {
     "walk": Measurement(
         "`tussock run --seed 9 --offset-m 0.1`",
@@ -197,13 +185,7 @@ MEASUREMENTS = {
     "arrivals": Measurement(
         "a sweep of `model` and `seed` with `offset-m = 0.1`",
         measure_arrivals,
-        {model: lambda values, model=model: of(values[model]) for model in MODELS},
-        slow=True,
-    ),
-    "dense-views": Measurement(
-        "a sweep of `model`, `world`, `seed`, `heading-noise-deg` and `offset-m` with `spacing-m = 0.04`",
-        measure_dense_views,
-        {model: lambda values, model=model: of(values[model]) for model in MODELS},
+        {model: lambda values, model=model: of(values[model]) for model in WALKERS},
         slow=True,
     ),
     "test-bed": Measurement(
