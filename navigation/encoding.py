@@ -45,27 +45,30 @@ BATCH_PIXELS = 108_000  # of views that are encoded at once: they stay in the pr
 
 @attrs.frozen
 class Encoding:
-    """A chain of steps, applied in order. What they make of a view is rounded to multiples of 1/4096 (`Round`).
+    """A chain of steps, applied in order. What they make of a view is rounded (`Round`).
 
     Attributes:
         steps: One that takes views (grey or foreground-mask, say), then any number of others. A resize by 1 is left out.
+        rounded: Whether values are rounded; not where a mask normalises them later, as low contrast would be lost.
     """
 
     steps: tuple[EncodingStep, ...] = attrs.field(
         converter=lambda steps: tuple(step for step in steps if step != Resize(1))
     )
+    rounded: bool = True
 
     def __attrs_post_init__(self):
+        if not self.steps:
+            raise SettingError("an encoding without steps; give at least grey")
         normalised = False
         for place, step in enumerate(self.steps):
             if getattr(step, "takes_views", False) != (place == 0):
                 where = "at the beginning only" if place else "after one that takes views, such as grey"
                 raise SettingError(f"encoding {str(self)!r}: {label(step)!r} can stand {where}")
             if normalised and getattr(step, "takes_unit_range", False):
-                raise SettingError(
-                    f"encoding {str(self)!r}: {label(step)} takes values from 0 to 1; put it before normalise"
-                )
-            normalised = normalised or isinstance(step, Normalise)
+                problem = f"{label(step)} takes values from 0 to 1; put it before normalise"
+                raise SettingError(f"encoding {str(self)!r}: {problem}")
+            normalised |= isinstance(step, Normalise)
 
     def __call__(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
         """Feature images of views (n, height, width, 3 or 4) uint8."""
@@ -84,6 +87,8 @@ class Encoding:
     @property
     def _applied(self) -> tuple[Any, ...]:
         """The steps, and the rounding of what they make of a view: before it is scaled down, so that this loses nothing."""
+        if not self.rounded:
+            return self.steps
         last = len(self.steps)
         while isinstance(self.steps[last - 1], Scale):
             last -= 1
@@ -113,7 +118,7 @@ class Encoding:
                     f"encoding {str(self)!r}: with a field or mask, normalise takes what is visible at each heading, so it stands last, "
                     f"or before scale only; put {label(step)} before it"
                 )
-        chain = attrs.evolve(self, steps=local)
+        chain = attrs.evolve(self, steps=local, rounded=at == len(self.steps))
         visible = chain.visible(visible)
         if not visible.any() or (known is not None and not chain.visible(known.visible()).any()):
             raise SettingError(

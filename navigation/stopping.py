@@ -3,6 +3,7 @@
 import math
 from enum import StrEnum
 
+from tussock.world.errors import SettingError
 from tussock.world.settings import choice, number, settings, switch, whole
 
 
@@ -46,6 +47,12 @@ class StoppingRules:
     put_back_at: str = choice("next-waypoint", ("next-waypoint", "nearest-point"))
     waypoint_spacing: float = number(0.1, above=0, unit="m")
     put_back_ahead: float | None = number(None, low=0, unit="m", optional=True)
+
+    def __attrs_post_init__(self) -> None:
+        if self.put_back_at == "nearest-point" and self.put_back_ahead is not None:
+            raise SettingError(
+                "an agent is put back at the nearest point, or ahead of it: give --on-lost reset with --put-back-ahead-m"
+            )
 
     def step_limit(self, route_length: float, step_length: float) -> int:
         """The number of steps after which a walk along a route of some length (m) ends."""

@@ -68,7 +68,8 @@ def training_poses(
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
     if parallel:
         offsets = np.linspace(-learning_walk, learning_walk, parallel) if parallel > 1 else np.zeros(1)
-        together = _abreast(poses, left, offsets)
+        offsets = offsets[np.argsort(-np.abs(offsets), kind="stable")]  # the last view of all is on the route
+        together = rounded(_abreast(poses, left, offsets))
         return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
     ahead = views.at(views.arc[::every] + AHEAD)[:, :2]
     batches = []
@@ -78,8 +79,7 @@ def training_poses(
             aim = ahead - xy
             batches.append(np.column_stack([xy, np.arctan2(aim[:, 1], aim[:, 0])]))
     batches.append(poses)  # last, so that the last view of all is the route's own at its end
-    together = np.stack(batches, axis=1).reshape(-1, 3)  # in the order of the route
-    together = rounded(together)
+    together = rounded(np.stack(batches, axis=1).reshape(-1, 3))  # in the order of the route
     return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
 
 

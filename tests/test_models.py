@@ -15,7 +15,11 @@ from tussock.navigation.models import MODELS, OPPONENT, make_model
 from tussock.navigation.models.base import FamiliarityModel, Model, memory_bytes
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.models.incremental import IncrementalModel
+from tussock.navigation.scan import scan_window
+from tussock.navigation.steering.navigator import Look
+from tussock.navigation.steering.scan import Scan
 from tussock.world.errors import InputError, SettingError
+from tussock.world.geometry import turn_of_columns
 
 REFUSED = (InputError, TypeCheckError)  # with type checking on, as here, a wrong rank does not reach our own check
 
@@ -99,6 +103,15 @@ def test_scan_of_a_rolled_view_is_the_rolled_scan(name, trained):
         wrong = (rolled - torch.roll(scan, -k, dims=-1)).abs() > 1e-4 * (scan.max() - scan.min())
         # The FFT rounds a rolled view differently, by 1e-7: a sum that near to a threshold may cross it.
         assert wrong.float().mean() <= (0.01 if base(name) in THRESHOLDS else 0)
+
+
+def test_a_scan_turns_to_the_most_familiar_rotation_in_its_window(trained):
+    look = Look(views=views(3, seed=1), compass=np.zeros(3))
+    scan = Scan(model=trained, width=2.0, refine=False)
+    motion = scan.decide(look, [scan.begin()] * 3)
+    window = scan_window(24, 2.0)
+    for turn, familiarity in zip(motion.turn, motion.scan.familiarity, strict=True):
+        assert np.isclose(turn, turn_of_columns(np.where(window, familiarity, -np.inf).argmax(), 24))
 
 
 def test_scan_of_a_rolled_view_with_flat_patches_is_the_rolled_scan(name):

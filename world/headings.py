@@ -171,8 +171,7 @@ def diagnose(poses: Float[np.ndarray, "n 3"], read_as: str = "ccw") -> Diagnosis
         return Diagnosis("follows", least)
     if least > OFF and _deviation(np.exp(1j * numbers)) < CONSTANT:
         return Diagnosis("constant", off, None, float(np.angle(np.exp(1j * numbers).mean())))
-    bends = np.abs(wrap_angle(np.diff(path_directions(poses[:, :2]))))
-    unsure = np.median(bends) / 2  # how well the path's direction at a row is known
+    unsure = fit.bend / 2  # how well the path's direction at a row is known
     if fit.explains(read_as):
         return Diagnosis("turned", off, best, mean) if abs(mean) > max(SAME, unsure) else Diagnosis("follows", off)
     if best is not None:
@@ -233,11 +232,13 @@ class _Fit:
         off: Median angle to the path of each convention (rad).
         remainder: Unit vectors at the angle between heading and path of each chord, of each convention.
         spread: 1 - R of the directions of the path. R is the length of the mean of unit vectors.
+        bend: Median angle between chords that follow one another (rad).
     """
 
     off: dict[str, float]
     remainder: dict[str, Complex[np.ndarray, " m"]]
     spread: float
+    bend: float
 
     @classmethod
     def of(cls, chords: _Chords, headings: dict[str, Complex[np.ndarray, " n"]]) -> "_Fit":
@@ -248,7 +249,10 @@ class _Fit:
             mean = np.diff(total[chords.ends + chords.shift])
             remainder[name] = np.exp(1j * np.angle(mean * chords.direction.conj()))
         off = {name: float(np.median(np.abs(np.angle(each)))) for name, each in remainder.items()}
-        return cls(off, remainder, 1 - float(np.abs(chords.direction.mean())))
+        bends = np.abs(np.angle(chords.direction[1:] * chords.direction[:-1].conj()))
+        return cls(
+            off, remainder, 1 - float(np.abs(chords.direction.mean())), float(np.median(bends)) if len(bends) else 0.0
+        )
 
     @property
     def chords(self) -> int:

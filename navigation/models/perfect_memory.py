@@ -24,7 +24,7 @@ FILTERS = 1000  # snapshots whose responses behind a mask are computed at once; 
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
 ROUNDING = 1e-6
-DECIMALS = 8  # of squared distances in float64, so that rounding does not decide between equal ones
+DECIMALS = 8  # of squared distances in float64 behind a mask
 
 
 @model
@@ -33,8 +33,8 @@ class PerfectMemory(IncrementalModel):
 
     Equation 1 of the thesis (section 4.3), exactly: the distance |v - s|^2 = |v|^2 - 2 v . s + |s|^2 needs one correlation, and where
     rounding could change which rotation or which snapshot is the best, it is computed again directly. Encoded views are multiples of
-    1/4096, whose float64 sums are exact in any order, so every processor decides alike. With a mask it is the distance of the visible
-    pixels, in float64. Memory grows with the number of views.
+    1/4096 (`scale` excepted), whose float64 sums are exact in any order, so every processor decides alike. With a mask it is the
+    distance of the visible pixels, in float64. Memory grows with the number of views.
 
     Where parts of images are unknown, the difference is that over what both show (see `Overlap`). Rotations that share too little of
     it with every snapshot are not compared: they are as familiar as the least familiar one of the others.
@@ -152,19 +152,24 @@ class PerfectMemory(IncrementalModel):
         of_views = energies(views, self.mask)
         least, index = torch.full_like(of_views, torch.inf), torch.zeros_like(of_views, dtype=torch.int64)
         for k, ((bank, squares), some) in enumerate(zip(self._banks, compared.split(FILTERS), strict=True)):
-            distances = (squares - 2 * bank.exact(views)).round(decimals=DECIMALS).where(some, torch.inf)
+            distances = self._coarse(squares - 2 * bank.exact(views)).where(some, torch.inf)
             values, which = distances.min(dim=2)
             index = (which + k * FILTERS).where(values < least, index)
             least = torch.minimum(values, least)
-        squared = (of_views.round(decimals=DECIMALS) + least).clamp(min=0)
+        squared = (self._coarse(of_views) + least).clamp(min=0)
         return -(squared / self._size(*views.shape[1:])).sqrt().float(), index
+
+    def _coarse(self, squared: Float64[torch.Tensor, "..."]) -> Float64[torch.Tensor, "..."]:
+        """Squared distances behind a mask, rounded so that the last bits do not decide between equal ones."""
+        assert self.mask is not None
+        unit = self.mask.gain**2
+        return (squared / unit).round(decimals=DECIMALS) * unit
 
     def _nearest_known(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """The same over what a view and each snapshot both show."""
         each_view = views.split(1)  # so that its bytes do not depend on the others
         blocks = [
-            torch.cat([each.squared(view).round(decimals=DECIMALS) for view in each_view]).min(dim=2)
-            for each in self._overlaps
+            torch.cat([self._coarse(each.squared(view)) for view in each_view]).min(dim=2) for each in self._overlaps
         ]
         squared, which = torch.stack([each.values for each in blocks]).min(dim=0)
         indices = torch.stack([each.indices + k * BLOCK for k, each in enumerate(blocks)])

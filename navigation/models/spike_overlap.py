@@ -11,7 +11,7 @@ from torch.nn.functional import embedding_bag
 from tussock.world.errors import SettingError
 from tussock.world.settings import number, whole, wholes
 
-from .base import Images, Learned, Scans, Shapes, model
+from .base import Images, Learned, Scans, Shapes, Windows, model
 from .checks import check_scan
 from .incremental import IncrementalModel
 from .mushroom_body import MAX_NUMBERS
@@ -58,7 +58,7 @@ class SpikeOverlap(IncrementalModel):
     field: float = number(2 * math.pi, low=math.radians(1), high=2 * math.pi, unit="rad")
     pixel: int = whole(1)
 
-    def match(self, views: Images) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
+    def match(self, views: Images, windows: Windows | None = None) -> tuple[Scans, Int64[torch.Tensor, "n w"]]:
         """`scan`, and which learned view is the most similar at each rotation."""
         check_scan(views, self.shape)
         if len(views) == 0:

@@ -29,9 +29,9 @@ class WindowMemory(PerfectMemory):
     paper = "Kagioulis et al. 2024"
     takes_partial = False
 
-    window: int = whole(20)
+    window: int = whole(20, low=3)
     adaptive: bool = switch(True)
-    smallest: int = whole(10)
+    smallest: int = whole(10, low=3)
 
     def follow(self) -> "WindowWalk":
         """Begin a walk, at the beginning of the sequence."""

@@ -1,18 +1,14 @@
 """A scan of headings that are a step apart."""
 
-import dataclasses
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool
 
 from tussock.world.geometry import columns_of_turn, wrap_angle
-from tussock.world.settings import number, settings
+from tussock.world.settings import number, settings, switch
 
-from ..scan import best_turn
-from .navigator import Look, Motion
+from .navigator import Look
 from .scan import Scan
 
 
@@ -24,14 +20,8 @@ class SteppedScan(Scan):
         step: Angle between headings (rad); they are rounded to whole columns of the view.
     """
 
+    refine: bool = switch(False)
     step: float = number(math.radians(10.0), above=0, high=2 * math.pi, unit="rad")
-
-    def decide(self, look: Look, memories: Sequence[Any]) -> Motion:
-        """Turn each agent to its most familiar heading, without looking between headings."""
-        motion = super().decide(look, memories)
-        assert motion.scan is not None
-        turn = best_turn(motion.scan.familiarity, motion.scan.window, interpolate=False)
-        return dataclasses.replace(motion, turn=turn)
 
     def _windows(self, width: int, look: Look) -> Bool[np.ndarray, "n w"]:
         middle = np.zeros(len(look)) if self.about is None else wrap_angle(self.about - look.compass)

@@ -73,7 +73,7 @@ def replicate(
     results = protocol.measure(walks)
     outcomes = check_claims(protocol.claims, [results], few_units=False)
     compared = compared_models(walks)
-    parts = [*[count_outcomes(outcomes)] * bool(outcomes), arrivals(walks, ["model"])]
+    parts = [*[count_outcomes(outcomes)] * bool(outcomes), arrivals(walks.assign(model=walks["spec"]), ["model"])]
     headline = "; ".join(parts) + "."
     report = _report(
         protocol, results, outcomes, compared, about=about, left_out=left_out, command=command, headline=headline
