@@ -68,7 +68,7 @@ def training_poses(
     left = np.column_stack([-np.sin(heading), np.cos(heading)])
     if parallel:
         offsets = np.linspace(-learning_walk, learning_walk, parallel) if parallel > 1 else np.zeros(1)
-        offsets = offsets[np.argsort(-np.abs(offsets), kind="stable")]  # the last view of all is on the route
+        offsets = offsets[np.argsort(-np.abs(offsets.round(9)), kind="stable")]  # the last view of all is on the route
         together = rounded(_abreast(poses, left, offsets))
         return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
     ahead = views.at(views.arc[::every] + AHEAD)[:, :2]
