@@ -117,20 +117,13 @@ def measure_learning_walks_sussex(folder: Path) -> Values:
     return {str(noise): arrivals(group, "learning_walk_m") for noise, group in table.groupby("heading_noise_deg")}
 
 
-def measure_arrivals(folder: Path) -> Values:
-    """How many walks of each model arrive in generated worlds."""
-    axes = {"model": WALKERS, "seed": seeds(0, 19)}
-    table = sweep(folder, "arrivals", {"world": "tussock-field", "offset-m": 0.1}, axes)
-    return arrivals(table, "model")
-
-
 def measure_test_bed(folder: Path) -> Values:
     """Every model on the test bed; the results are in docs/benchmark."""
     for model in MODELS:
         tussock(folder, "benchmark", "--model", model, "--out", "bed")
     for path in (folder / "bed" / "results").glob("*.json"):
         (RESULTS / path.name).write_bytes(path.read_bytes())
-    return {"entries": len(MODELS)}
+    return {"arrived": {result.entry: result.scores()["totals"]["arrived_share"] for result in read_results(RESULTS)}}
 
 
 def sussex(*names: str) -> list[str]:
@@ -162,7 +155,6 @@ MODELS = [
     "infomax",
     "mushroom-body",
 ]
-WALKERS = ["perfect-memory", "mlp-rotation", "rbm", "infomax", "mushroom-body"]  # of whose walks README tells
 MEASUREMENTS = {
     "walk": Measurement(
         "`tussock run --seed 9 --offset-m 0.1`",
@@ -184,16 +176,11 @@ MEASUREMENTS = {
         with_and_without("0") | with_and_without("10"),
         slow=True,
     ),
-    "arrivals": Measurement(
-        "a sweep of `model` and `seed` with `offset-m = 0.1`",
-        measure_arrivals,
-        {model: lambda values, model=model: of(values[model]) for model in WALKERS},
-        slow=True,
-    ),
     "test-bed": Measurement(
         "`tussock benchmark --model NAME`",
         measure_test_bed,
-        {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
+        {model: lambda values, model=model: f"{values['arrived'][model]:.0%}".replace("%", " %") for model in MODELS}
+        | {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
         slow=True,
     ),
 }
