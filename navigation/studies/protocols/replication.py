@@ -73,8 +73,7 @@ def replicate(
     results = protocol.measure(walks)
     outcomes = check_claims(protocol.claims, [results], few_units=False)
     compared = compared_models(walks)
-    parts = [*[count_outcomes(outcomes)] * bool(outcomes), arrivals(walks.assign(model=walks["spec"]), ["model"])]
-    headline = "; ".join(parts) + "."
+    headline = _headline(outcomes, arrivals(walks.assign(model=walks["spec"]), ["model"]))
     report = _report(
         protocol, results, outcomes, compared, about=about, left_out=left_out, command=command, headline=headline
     )
@@ -120,7 +119,7 @@ def measure_images(
     began = time.perf_counter()
     results = protocol.measure(folder, seed, progress)
     outcomes = check_claims(protocol.claims, [results], few_units=False)
-    headline = count_outcomes(outcomes) + "."
+    headline = _headline(outcomes)
     report = _report(protocol, results, outcomes, {}, about=about, left_out={}, command=command, headline=headline)
     write_report(report, out)
     return {
@@ -129,6 +128,12 @@ def measure_images(
         "claims": {each.claim.key: {"holds": each.label} for each in outcomes},
         "seconds": time.perf_counter() - began,
     }
+
+
+def _headline(outcomes: list[Outcome], *others: str) -> str:
+    """The main results in a sentence: how many claims hold, where there are any, and other parts."""
+    parts = [*([count_outcomes(outcomes)] if outcomes else []), *others]
+    return "; ".join(parts) + "." if parts else ""
 
 
 def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame, dict[str, int]]:
