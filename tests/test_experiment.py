@@ -84,7 +84,7 @@ VALUES: dict[str, st.SearchStrategy] = {
     "heading_noise_deg": decimals(0, 90),
     "scan_deg": decimals(0.001, 360),
     "scan_about_deg": decimals(-360, 360),
-    "on_lost": st.sampled_from(["stop", "reset", "reset-nearest"]),
+    "on_lost": st.sampled_from(["stop", "reset"]),
     "waypoint_m": POSITIVE,
     "put_back_ahead_m": st.floats(0, 9),
     "arrive_m": POSITIVE,
@@ -155,6 +155,13 @@ def test_an_experiment_follows_from_its_settings(given_settings):
     for name, value in given_settings.items():  # what was given, where it is not as by default in other words
         if name not in ("encoding", "resize"):
             assert settings[name] == (value if name != "model" else value.removesuffix(" units=none"))
+
+
+def test_an_agent_is_put_back_at_the_nearest_point_or_ahead_of_it():
+    settings = {"on_lost": "reset-nearest"}
+    assert settings_of(experiment_of(settings))["on_lost"] == "reset-nearest"
+    with pytest.raises(SettingError, match="--on-lost reset with --put-back-ahead-m"):
+        experiment_of({**settings, "put_back_ahead_m": 0.3})
 
 
 @given(st.floats(0, 2), st.floats(1e-3, 2 * math.pi), st.floats(-9, 9), st.floats(0.01, math.pi / 2))
