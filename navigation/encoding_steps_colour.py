@@ -191,7 +191,7 @@ class ArdinPlanes(EncodingStep):
 
 
 def _split(images: np.ndarray, planes: int, name: str) -> np.ndarray:
-    """Images (n, planes x h, w) as (n, planes, h, w). Raises SettingError where the rows are not so many planes."""
+    """Images (n, planes x h, w) as (n, planes, h, w). Raises SettingError where the rows are another number of planes."""
     n, rows, width = images.shape
     if rows % planes:
         raise SettingError(f"{name} takes {planes} planes of equal size, got {rows} rows; put green-blue before it")

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.stats import t as student
 
 CONFIDENCE = 0.95
-MIN_WORLDS = 5  # with fewer there is no interval: too little is known of how much worlds differ
+MIN_WORLDS = 5  # for an interval: fewer tell too little about how much worlds differ
 SHARES, DEVIATIONS = (
     200,
     32,

@@ -10,8 +10,8 @@ from jaxtyping import Float, Int
 
 from .intervals import MIN_WORLDS, world_sums
 
-EXACT_WORLDS = 13  # up to so many, all 8,192 changes of signs are tried
-DRAWS = 9_999  # with more, so many are drawn ..
+EXACT_WORLDS = 13  # up to this number of worlds, all 8,192 changes of signs are tried
+DRAWS = 9_999  # changes that are drawn for more worlds ..
 MAX_DRAWN_WORLDS = 100  # .. and with still more, their sum has a normal distribution
 
 

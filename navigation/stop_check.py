@@ -14,12 +14,13 @@ class StopCheck:
         furthest: Greatest distance along the route that it has reached (m).
         since: Steps that it has made since it got there, in whole steps.
         along: Distance along the route where it was checked last (m).
+        resumed: Distance along the route where it was put back last (m).
     """
 
     def __init__(self, stopping: StoppingRules, route: Route, field: Bounds, step_length: float):
         self.stopping, self.route, self.field, self.step_length = stopping, route, field, step_length
         self.furthest, self.since = -np.inf, 0.0
-        self.along, self.resumed = 0.0, 0.0  # where it is now, and where it was put back last
+        self.along, self.resumed = 0.0, 0.0
         self.been_away = not self._at_goal(route.start)  # where the route ends near its start, it must leave first
 
     def check(self, pose: Pose, deviation: float, along: float) -> StopReason | None:

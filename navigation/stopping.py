@@ -31,12 +31,12 @@ class StoppingRules:
         patience: The agent is stuck after this distance without getting farther along the route (m).
         max_steps: Limit of steps; None means as many as three times the route's length needs.
         put_back: Instead of ending the walk, put an agent that is lost, stuck, out of the world, stopped by the ground or off the grid
-            back on the route, facing along the route. Ardin et al. (2016) count errors so.
+            back on the route, facing along the route. This is how Ardin et al. (2016) count errors.
         put_back_at: Where: "next-waypoint" is the waypoint after the furthest one that it reached, "nearest-point" the nearest point of
             the route.
         waypoint_spacing: Distance between waypoints along the route (m).
         put_back_ahead: Put back this far ahead of the point of the route nearest to the agent (m), in place of a waypoint; None means
-            a waypoint. Kagioulis et al. (2024) count failures so.
+            a waypoint. This is how Kagioulis et al. (2024) count failures.
     """
 
     arrival_radius: float = number(0.15, above=0, unit="m")

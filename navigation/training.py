@@ -49,7 +49,7 @@ def training_poses(
         spacing: Distance between route views (m).
         every: Learn every N-th of these.
         learning_walk: Reach of the learning walk to both sides (m); 0 is training on the route only, as in the thesis.
-        parallel: Number of views at each position that are spread evenly over this reach, from the right to the left of the route, and all
+        parallel: Number of views at each position that are spread evenly over this reach, the farthest first, and all
             face along it; 0: those of the learning walk.
         field: Poses outside of it are left out.
 
@@ -63,24 +63,16 @@ def training_poses(
     views = route.resampled(spacing)
     poses = views.poses[::every]
     if learning_walk == 0:
+        if parallel > 1:
+            _remark_on_parallel_views()
         return rounded(poses)
-    heading = poses[:, 2]
-    left = np.column_stack([-np.sin(heading), np.cos(heading)])
+    left = np.column_stack([-np.sin(poses[:, 2]), np.cos(poses[:, 2])])
     if parallel:
-        offsets = np.linspace(-learning_walk, learning_walk, parallel) if parallel > 1 else np.zeros(1)
-        offsets = offsets[np.argsort(-np.abs(offsets.round(9)), kind="stable")]  # the last view of all is on the route
-        together = rounded(_abreast(poses, left, offsets))
-        return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
-    ahead = views.at(views.arc[::every] + AHEAD)[:, :2]
-    batches = []
-    for share in SIDES:
-        for side in (1, -1):
-            xy = poses[:, :2] + side * share * learning_walk * left
-            aim = ahead - xy
-            batches.append(np.column_stack([xy, np.arctan2(aim[:, 1], aim[:, 0])]))
-    batches.append(poses)  # last, so that the last view of all is the route's own at its end
-    together = rounded(np.stack(batches, axis=1).reshape(-1, 3))  # in the order of the route
-    return together if field is None else together[field.contains(together[:, 0], together[:, 1])]
+        beside = _parallel_poses(poses, left, learning_walk, parallel)
+    else:
+        beside = _looking_ahead(poses, left, learning_walk, views.at(views.arc[::every] + AHEAD)[:, :2])
+    beside = rounded(beside)
+    return beside if field is None else beside[field.contains(beside[:, 0], beside[:, 1])]
 
 
 def poses_of_setup(setup: TrainingSetup, route: Route, field: Bounds | None = None) -> Float[np.ndarray, "n 3"]:
@@ -95,13 +87,29 @@ def poses_of_setup(setup: TrainingSetup, route: Route, field: Bounds | None = No
     )
 
 
-def _abreast(
-    poses: Float[np.ndarray, "n 3"], left: Float[np.ndarray, "n 2"], offsets: Float[np.ndarray, " k"]
+def _parallel_poses(
+    poses: Float[np.ndarray, "n 3"], left: Float[np.ndarray, "n 2"], reach: float, count: int
 ) -> Float[np.ndarray, "m 3"]:
-    """Poses moved to the left by offsets (m), those of one position together."""
+    """Poses moved to both sides by up to a reach (m), `count` of each, facing as they did."""
+    offsets = np.linspace(-reach, reach, count) if count > 1 else np.zeros(1)
+    offsets = offsets[np.argsort(-np.abs(offsets.round(9)), kind="stable")]  # the last view of all is on the route
     moved = np.repeat(poses[:, None], len(offsets), axis=1)
     moved[..., :2] += offsets[:, None] * left[:, None]
     return moved.reshape(-1, 3)
+
+
+def _looking_ahead(
+    poses: Float[np.ndarray, "n 3"], left: Float[np.ndarray, "n 2"], reach: float, ahead: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "m 3"]:
+    """Poses moved to both sides by shares of a reach (m), facing points ahead, and then the poses themselves."""
+    batches = []
+    for share in SIDES:
+        for side in (1, -1):
+            xy = poses[:, :2] + side * share * reach * left
+            aim = ahead - xy
+            batches.append(np.column_stack([xy, np.arctan2(aim[:, 1], aim[:, 0])]))
+    batches.append(poses)  # last, so that the last view of all is the route's own at its end
+    return np.stack(batches, axis=1).reshape(-1, 3)  # in the order of the route
 
 
 def training_poses_in(
@@ -132,6 +140,11 @@ def training_poses_in(
     facing = np.column_stack([beside[near], np.arctan2(aim[:, 1], aim[:, 0])])
     order = np.argsort(np.concatenate([along[near], arc]), kind="stable")  # so that of equals, the route's own is last
     return np.concatenate([facing, poses])[order]
+
+
+@cache  # once, however many models learn
+def _remark_on_parallel_views() -> None:
+    log.warning("parallel views need a reach, so only those on the route are learned; give --learning-walk-m")
 
 
 @cache  # once, however many models learn

@@ -10,8 +10,8 @@ import pytest
 import torch
 from scenes import random_poses, random_world
 from scipy import ndimage
-from scipy.stats import permutation_test
 
+from tussock.navigation import training
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.encoding_steps_colour import COLOUR_STEPS, _filtered, _hexagonal
 from tussock.navigation.models import SpikeOverlap, make_model
@@ -20,15 +20,14 @@ from tussock.navigation.reports.claims import check_claims
 from tussock.navigation.steering import NAVIGATORS, Look
 from tussock.navigation.studies.protocols import APIAVIZ2026, routes_in
 from tussock.navigation.studies.protocols.apiaviz2026 import ANTS, INPUTS, PUBLISHED, SEEDS, coloured
-from tussock.navigation.studies.protocols.crossed import crossed_interval, holm, sign_flip
-from tussock.navigation.studies.protocols.protocol import prepared_world, route_files
+from tussock.navigation.studies.protocols.crossed import crossed_interval
+from tussock.navigation.studies.protocols.protocol import prepared, route_files
 from tussock.navigation.training import training_poses
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import FileError, SettingError
 from tussock.world.files import read_world, write_world
 from tussock.world.geometry import Route, rounded
-from tussock.world.meshes.reading import MeshReading
 
 RANDOM = np.random.default_rng(1)
 
@@ -286,27 +285,15 @@ def test_parallel_views_lie_side_by_side_and_face_along_the_route():
     assert np.allclose(training_poses(route, 0.1, learning_walk=0.2, parallel=1), on_route)
 
 
+def test_parallel_views_without_a_reach_are_a_remark(caplog):
+    training._remark_on_parallel_views.cache_clear()
+    route = Route.through(np.array([[0.0, 0], [1, 0]]))
+    assert np.array_equal(training_poses(route, 0.1, parallel=9), training_poses(route, 0.1))
+    (record,) = caplog.records
+    assert "--learning-walk-m" in record.message
+
+
 # Statistics
-
-
-def test_holm_by_hand():
-    assert holm(np.array([0.01, 0.04, 0.03, 0.005])) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm(np.array([0.9, 0.8])) == pytest.approx([1.0, 1.0])
-    assert holm(np.array([])).size == 0
-
-
-def test_the_sign_flip_test_is_scipys():
-    for seed in range(4):
-        differences = np.random.default_rng(seed).normal(0.5, 1, 8)
-        exact = permutation_test(
-            (differences,),
-            lambda x, axis: x.mean(axis=axis),
-            permutation_type="samples",
-            n_resamples=np.inf,
-            vectorized=True,
-        )
-        assert sign_flip(differences) == pytest.approx(exact.pvalue)
-    assert sign_flip(np.array([1.0, 1, 1, 1, 1, 1, 1, 1])) == 2 / 256
 
 
 def test_a_crossed_interval_is_that_of_drawing_routes_and_seeds():
@@ -404,10 +391,12 @@ def test_tints_change_colour_and_not_brightness():
 
 def test_the_coloured_world_is_kept_in_the_folder(tmp_path):
     write_world(green_world(), tmp_path / "green.glb")
-    where = prepared_world(APIAVIZ2026, str(tmp_path / "green.glb"), MeshReading(), tmp_path / "out")
-    assert np.array_equal(read_world(where).rgb, coloured(read_world(tmp_path / "green.glb")).rgb)
-    assert prepared_world(APIAVIZ2026, str(tmp_path / "green.glb"), MeshReading(), tmp_path / "out") == where
-    assert prepared_world(APIAVIZ2026, "tiny", MeshReading(), tmp_path / "out") == "tiny"
+    given = routes_in(str(tmp_path / "green.glb"), [], count=2)
+    one, other = prepared(APIAVIZ2026, given, tmp_path / "out")
+    assert one["world"] == other["world"]
+    assert np.array_equal(read_world(one["world"]).rgb, coloured(read_world(tmp_path / "green.glb")).rgb)
+    assert prepared(APIAVIZ2026, given, tmp_path / "out") == [one, other]
+    assert prepared(APIAVIZ2026, routes_in("tiny", []), tmp_path / "out") == routes_in("tiny", [])
 
 
 def test_routes_are_taken_of_a_folder(tmp_path, caplog):

@@ -32,7 +32,7 @@ from tussock.navigation.studies.protocols import (
     KAGIOULIS2024,
     PROTOCOLS,
     Protocol,
-    laid_out,
+    prepared,
     routes_in,
 )
 from tussock.navigation.studies.protocols.ardin2016_published import share_of_the_way
@@ -41,10 +41,10 @@ from tussock.navigation.studies.protocols.effects import over_routes
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
 from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import SettingError
 from tussock.world.files import write_world
 from tussock.world.geometry import Route
-from tussock.world.route_files import read_route, routes_at, write_route
+from tussock.world.route_files import read_route, write_route
 from tussock.world.scene import World
 
 TINY = ("--quick", "--world", "tiny", "--worlds", "2")
@@ -547,7 +547,7 @@ def test_routes_as_published_are_steps_of_10_cm_in_even_degrees(tmp_path):
     angles = np.linspace(0, 1.2, 90)
     write_route(Route.through(0.5 + 2 * np.column_stack([np.cos(angles), np.sin(angles)])), path)
     plain = routes_in("tiny", [path])
-    (laid,) = laid_out(ARDIN2016.as_published, plain, tmp_path / "routes")
+    (laid,) = prepared(ARDIN2016.as_published, plain, tmp_path)
     assert laid["route"] == tmp_path / "routes" / "01-curved.csv"
     route, given = read_route(laid["route"]), read_route(path)
     steps = np.diff(route.xy, axis=0)
@@ -555,7 +555,7 @@ def test_routes_as_published_are_steps_of_10_cm_in_even_degrees(tmp_path):
     degrees = np.degrees(np.arctan2(steps[:, 1], steps[:, 0]))
     assert np.allclose(degrees / 2, np.rint(degrees / 2), atol=1e-6)
     assert given.nearest(route.xy)[0].max() < 0.03
-    assert laid_out(ARDIN2016, plain, tmp_path / "none") == plain
+    assert prepared(ARDIN2016, plain, tmp_path / "none") == plain
     assert not (tmp_path / "none").exists()
 
 
@@ -613,13 +613,3 @@ def test_a_protocol_without_a_variant_refuses_as_published_in_one_line(name, cap
     assert end.value.code == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert f"--as-published: {name} has no such variant" in line
-
-
-def test_a_folder_stands_for_the_routes_in_it(tmp_path):
-    for name in ("ant2_route1.csv", "ant1_route1.csv", "world.bin", "README.md"):
-        (tmp_path / name).touch()
-    assert [path.name for path in routes_at(tmp_path)] == ["ant1_route1.csv", "ant2_route1.csv"]
-    assert routes_at(tmp_path / "world.bin") == [tmp_path / "world.bin"]
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(FileError, match="no file with 'route' in its name"):
-        routes_at(tmp_path / "empty")

@@ -197,7 +197,7 @@ def test_wiring_draws_every_set_equally_often(choices, size):
 
 
 def test_capacity_is_that_of_the_paper():
-    """m = ln(1 - P^(1 / (N p))) / ln(1 - p) = 376 views: so many random codes, of a share p = 0.01 of N = 20,000 cells, can be learned
+    """m = ln(1 - P^(1 / (N p))) / ln(1 - p) = 376 random codes, each of a share p = 0.01 of N = 20,000 cells, can be learned
     until a share P = 0.01 of new ones brings the output neuron no spike, as if it had been learned."""
     cells, share, wrong = 20_000, 0.01, 0.01
     views_learned = math.log(1 - wrong ** (1 / (cells * share))) / math.log(1 - share)

@@ -63,22 +63,6 @@ def read_route(
         raise naming(path, error) from error
 
 
-def routes_at(path: Path) -> list[Path]:
-    """The route files that a path stands for: itself, or those of a folder with `route` in their names, in the order of these.
-
-    Raises:
-        FileError: For a folder without such a file.
-    """
-    if not os.path.isdir(path) or os.path.isfile(
-        path / "database_entries.csv"
-    ):  # `read_route` refuses an image database
-        return [path]
-    routes = sorted(each for each in path.iterdir() if "route" in each.name.lower() and each.is_file())
-    if not routes:
-        raise FileError(f"the folder {path} has no file with 'route' in its name; give the route files themselves")
-    return routes
-
-
 def _route(path: Path, points: Points, headings: str, smooth: float) -> Route:
     """The route through points, with their headings as `read_route` takes them."""
     if len(points.xy) < 2:

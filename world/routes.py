@@ -79,7 +79,7 @@ def in_equal_steps(route: Route, step: float, turn: float) -> Route:
     """A route along another one in straight steps of one length, whose directions are multiples of an angle.
 
     An agent with this step that always turns by the right multiple of the angle stands on its points exactly. It drifts away from the
-    given route by up to some centimetres. So the program of Ardin et al. (2016) lays out its routes, with 10 cm and 2 degrees.
+    given route by up to some centimetres. The program of Ardin et al. (2016) lays out its routes in this way, with 10 cm and 2 degrees.
 
     Args:
         route: The route.

@@ -252,7 +252,7 @@ class PlayCommand(Command):
 
 
 def table_by_distance(errors: "HeadingErrors") -> dict[str, dict[str, float]]:
-    """The numbers of heading errors by the distance from the route, and of all; nothing where there are no positions."""
+    """The numbers of heading errors by the distance from the route, and of all; empty without positions."""
     bands = errors.by_distance() | ({"all": errors} if len(errors) else {})
     return {name: band.summary() for name, band in bands.items()}
 

@@ -46,15 +46,17 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
     def run(self) -> dict[str, Any]:
         workers = self.started_workers()
         from ..reports.report import check_report_folder
+        from ..studies.protocols import prepared
         from ..studies.protocols.replication import replicate
 
         protocol = self.protocol()
         out = self.out or Path(protocol.name)
         self.check()
-        sweep = self.sweep(protocol, out)
+        routes = self.choices(protocol)
+        sweep = self.sweep(protocol, routes)
         about = self.about(protocol, sweep)
         check_report_folder(out, about, overwrite=self.overwrite)
-        sweep = self.sweep(protocol, out, written=True) if protocol.layout is not None else sweep
+        sweep = self.sweep(protocol, prepared(protocol, routes, out))
         message(f"{len(sweep)} runs: {sweep}")
         with progress("walking", "runs", verbose=True) as report:
             command = self.command(out)
@@ -89,29 +91,18 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
         """The given route files and folders."""
         return [Path(name) for given in self.route for name in given.split(",") if name]
 
-    def sweep(self, protocol: "Protocol", out: Path, *, written: bool = False) -> "Sweep":
-        """The runs, each checked.
-
-        Args:
-            protocol: The experiment.
-            out: Where a world is written that the protocol prepares, and routes that it lays out.
-            written: Lay out the routes, in files; else take them as they are.
-
-        Raises:
-            InputError: For settings of which there can be no run.
-        """
-        from ..studies.protocols import laid_out, routes_in
-        from ..studies.protocols.protocol import prepared_world, route_files
+    def choices(self, protocol: "Protocol") -> "list[Change]":
+        """The worlds with one route each, as they are given. Raises InputError."""
+        from ..studies.protocols import route_files, routes_in
 
         count = self.worlds or (protocol.quick_worlds if self.quick else protocol.worlds)
-        given, reading = self.world or protocol.world, self.reading()
-        files = route_files(self.routes(), protocol.route_names, Path(given) if Path(given).is_file() else None)
-        world = prepared_world(protocol, given, reading, out)
+        world, reading = self.world or protocol.world, self.reading()
+        files = route_files(self.routes(), protocol.route_names, Path(world) if Path(world).is_file() else None)
         routes: list[Change] = routes_in(world, files, seed=self.seed, count=count)
-        if reading != MeshReading() and world == given:
-            routes = [{**each, "reading": reading} for each in routes]
-        if written:
-            routes = laid_out(protocol, routes, out / "routes")
+        return routes if reading == MeshReading() else [{**each, "reading": reading} for each in routes]
+
+    def sweep(self, protocol: "Protocol", routes: "list[Change]") -> "Sweep":
+        """The runs on routes, each checked. Raises InputError."""
         return protocol.sweep(routes, quick=self.quick, cull_back_faces=self.cull_back_faces, seed=self.seed)
 
     def about(self, protocol: "Protocol", sweep: "Sweep") -> dict[str, Any]:

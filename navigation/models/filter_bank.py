@@ -31,7 +31,7 @@ class FilterBank:
     """Filters, ready to meet any number of views.
 
     Args:
-        filters: (m, h, w) float32; or float64, with which sums are too exact for rounding to separate equal responses.
+        filters: (m, h, w) float32; or float64, in which equal responses stay equal.
         biases: (m,) Added to the responses; None means none.
         mask: What the filters see of the views; None means everything.
     """

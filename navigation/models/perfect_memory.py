@@ -141,7 +141,7 @@ class PerfectMemory(IncrementalModel):
         first, last, _ = among.indices(len(self._on_cpu))
         doubts = tolerance.cpu().numpy(), nearest.doubtful.cpu().numpy()
         index = nearest.index.cpu().numpy()
-        _settle(views.cpu().numpy(), self._on_cpu, first, last, allowed, *doubts, squared, index)
+        _decide_exactly(views.cpu().numpy(), self._on_cpu, first, last, allowed, *doubts, squared, index)
         familiarity = -np.sqrt(squared.clip(min=0) / (height * width)).astype(np.float32)
         return self._on_device(torch.from_numpy(familiarity)), self._on_device(torch.from_numpy(index))
 
@@ -183,7 +183,7 @@ class PerfectMemory(IncrementalModel):
 
 
 @compiled
-def _settle(views, snapshots, first, last, allowed, tolerance, doubtful, squared, index):
+def _decide_exactly(views, snapshots, first, last, allowed, tolerance, doubtful, squared, index):
     """Compute squared distances (n, w) directly where rounding leaves undecided which of the allowed is the least, and next to these.
 
     Where another of the snapshots `first` to `last` may be as near, all of them are compared.
@@ -198,8 +198,8 @@ def _settle(views, snapshots, first, last, allowed, tolerance, doubtful, squared
         needed[:] = False
         for turn in range(width):
             if allowed[v, turn] and squared[v, turn] <= least + tolerance[v]:
-                for near in range(turn - 1, turn + 2):  # a heading is interpolated from three
-                    needed[near % width] = True
+                for neighbour in range(turn - 1, turn + 2):  # a heading is interpolated from three
+                    needed[neighbour % width] = True
         for turn in range(width):
             if not needed[turn]:
                 continue

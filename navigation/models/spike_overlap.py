@@ -85,7 +85,7 @@ class SpikeOverlap(IncrementalModel):
             raise SettingError(
                 f"{self.name}: {self.cells} cells and {max(fields)} fields have over {MAX_NUMBERS:,} possible connections; give fewer"
             )
-        self._pooling(height, width)  # refuses views that are not so many planes
+        self._pooling(height, width)  # refuses views of another number of planes
         wiring = [
             torch.rand(part.stop - part.start, count, generator=random).topk(self.inputs, dim=1).indices
             for count, part in zip(fields, self._parts(), strict=True)
@@ -198,5 +198,5 @@ def first_to_fire(drive: Float32[torch.Tensor, "n cells"], active: float) -> Boo
     times = TAU * torch.log1p(1 / (GAIN * drive.clamp(min=1e-30)))
     bins = times.ceil().clamp(max=never).where(drive > 0, never).long()  # ms
     spikes = bins.new_zeros(len(drive), never + 1).scatter_add_(1, bins, torch.ones_like(bins))
-    start = (spikes.cumsum(dim=1) < count).sum(dim=1, keepdim=True)  # when so many have fired
+    start = (spikes.cumsum(dim=1) < count).sum(dim=1, keepdim=True)  # when `count` cells have fired
     return (bins <= start + DELAY) & (bins < never)

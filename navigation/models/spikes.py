@@ -65,7 +65,9 @@ def steps_to_spike(
     """
     steps = np.arange(1, presentation + 1)
     resistance = neuron.gain / (1 - neuron.decay)
-    least = neuron.threshold / (resistance * (1 - neuron.decay**steps))  # current that is enough for so many steps
+    least = neuron.threshold / (
+        resistance * (1 - neuron.decay**steps)
+    )  # current with which the threshold is reached in `steps`
     return np.searchsorted(-least, -current).astype(np.int16)
 
 

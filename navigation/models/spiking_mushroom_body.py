@@ -17,7 +17,7 @@ from .incremental import IncrementalModel
 from .spikes import Neuron, Plasticity, fire, learn, peaks, respond, steps_to_spike, synaptic_currents
 
 log = logging.getLogger(__name__)
-NEURONS = 360  # projection neurons of the original, 36 x 10; its current is meant for so many
+NEURONS = 360  # projection neurons of the original, 36 x 10; its current is meant for this number
 MIN_CELLS = 10  # Kenyon cells that a view needs to be told from others
 NUMBERS = 2**23  # of pixels at rotations that are held at once: 64 MB
 

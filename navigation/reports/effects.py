@@ -49,11 +49,17 @@ def effect_size(label: str, units: int, statistic: Statistic, *, of: str) -> Eff
         The effect.
     """
     value = float(statistic(np.arange(units))) if units else math.nan
-    low = high = math.nan
-    if units >= MIN_UNITS and math.isfinite(value):
-        drawn = np.random.default_rng(0).integers(0, units, (SAMPLES, units))
-        values = [statistic(sample) for sample in drawn]
-        ends = np.nanquantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-        if ends[0] < ends[1]:
-            low, high = ends.tolist()
+    low, high = bootstrap(units, statistic) if math.isfinite(value) else (math.nan, math.nan)
+    if low == high:
+        low = high = math.nan
     return Effect(label=label, value=value, low=low, high=high, units=units, of=of)
+
+
+def bootstrap(units: int, statistic: Statistic, samples: int = SAMPLES) -> tuple[float, float]:
+    """The ends of the percentile bootstrap interval of a statistic; nan for fewer than MIN_UNITS units. Arguments as of `effect_size`."""
+    if units < MIN_UNITS:
+        return math.nan, math.nan
+    drawn = np.random.default_rng(0).integers(0, units, (samples, units))
+    values = [statistic(sample) for sample in drawn]
+    low, high = np.nanquantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return float(low), float(high)

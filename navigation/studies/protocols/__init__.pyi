@@ -8,6 +8,7 @@ from .protocol import DatabaseProtocol as DatabaseProtocol
 from .protocol import Item as Item
 from .protocol import Parameter as Parameter
 from .protocol import Protocol as Protocol
-from .protocol import laid_out as laid_out
+from .protocol import prepared as prepared
+from .protocol import route_files as route_files
 from .protocol import routes_in as routes_in
 from .registry import PROTOCOLS as PROTOCOLS

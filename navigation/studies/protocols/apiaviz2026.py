@@ -12,11 +12,13 @@ from tussock.world.scene import Ground, World
 from ...body import Body
 from ...encoding import Encoding
 from ...experiment import Experiment
+from ...intervals import MIN_WORLDS
 from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
+from ...significance import holm, sign_flip_p
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
-from .crossed import MIN_ROUTES, crossed_interval, holm, sign_flip
+from .crossed import crossed_interval
 from .figures_published import beside
 from .protocol import Item, Parameter, Protocol
 
@@ -124,7 +126,15 @@ def _differences(walks: pd.DataFrame, inputs: list[str]) -> pd.DataFrame:
         paired = other - apia
         mean, low, high, p = PUBLISHED_DIFFERENCES[name]
         ours = crossed_interval(paired)
-        numbers = (mean, low, high, float(paired.mean()), *ours, p, sign_flip(paired.mean(axis=1)))
+        numbers = (
+            mean,
+            low,
+            high,
+            float(paired.mean()),
+            *ours,
+            p,
+            sign_flip_p(paired.mean(axis=1), np.arange(len(paired))),
+        )
         rows.append([name, *numbers])
     columns = [
         "input",
@@ -138,11 +148,11 @@ def _differences(walks: pd.DataFrame, inputs: list[str]) -> pd.DataFrame:
         "p (Holm)",
     ]
     table = pd.DataFrame(rows, columns=columns)
-    return table.assign(**{"p (Holm)": holm(table["p (Holm)"].to_numpy(float))})
+    return table.assign(**{"p (Holm)": holm(table["p (Holm)"].tolist())})
 
 
 def _enough(results: StudyResults) -> bool:
-    return results.numbers["routes"] >= MIN_ROUTES
+    return results.numbers["routes"] >= MIN_WORLDS
 
 
 @claim(
@@ -178,7 +188,7 @@ def _ardin_least(results: StudyResults) -> Decision:
     "differences",
     "no p after Holm's correction is under 0.05",
     published={f"p, {name}": each[-1] for name, each in PUBLISHED_DIFFERENCES.items()},
-    note=f"Exact sign-flip tests over routes; with fewer than {MIN_ROUTES} routes they can find nothing.",
+    note=f"Exact sign-flip tests over routes; with fewer than {MIN_WORLDS} routes they can find nothing.",
 )
 def _no_input_differs(results: StudyResults) -> Decision:
     """No input's mean deviation differs significantly from that of ApiaViz."""
@@ -222,7 +232,7 @@ ITEMS = (
         "Completed walks and deviation",
         "by_input",
         "Published and obtained. The ends low and high are of the 95 % interval of a crossed bootstrap over routes and seeds; fewer than "
-        f"{MIN_ROUTES} routes have none.",
+        f"{MIN_WORLDS} routes have none.",
     ),
     Item(
         "completed",

@@ -13,6 +13,7 @@ from tussock.world.routes import in_equal_steps
 from ...body import Body
 from ...experiment import Experiment
 from ...reports.claims import Decision, claim
+from ...reports.effects import bootstrap
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
@@ -22,7 +23,6 @@ from .protocol import Item, Parameter, Protocol
 PERFECT, BODY, INFOMAX, RANDOM = "perfect-memory", "spiking-mushroom-body", "infomax", "random"
 NOTE = "Published as box plots only (figure 4D)."
 PUT_BACK = {"reset": "at the next waypoint", "reset-nearest": "at the nearest point"}  # by the setting on_lost
-MIN_ROUTES = 5  # for an interval
 SAMPLES = 4000  # of a bootstrap
 SHARE = "share of the way from perfect memory to random"
 
@@ -76,7 +76,7 @@ def _by(walks: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
     rows = []
     for values, some in walks.groupby(columns, sort=False):
         of_routes = some.groupby("place")["errors"].mean().to_numpy()
-        low, high = interval(of_routes[:, None], lambda means: means[0])
+        low, high = bootstrap(len(of_routes), lambda rows, errors=of_routes: float(errors[rows].mean()), SAMPLES)
         row = dict(zip(columns, values, strict=True))
         row |= {"errors a walk": some["errors"].mean(), "low": low, "high": high, "arrived": some["arrived"].mean()}
         rows.append(row | {"routes": len(of_routes), "walks": len(some)})
@@ -91,34 +91,18 @@ def share_of_the_way(walks: pd.DataFrame, body: str = BODY) -> tuple[float, floa
         body: The model in question.
 
     Returns:
-        The share, and the ends of its interval over routes: nan for fewer than MIN_ROUTES.
+        The share, and the ends of its interval over routes: nan for fewer than MIN_UNITS.
     """
     means = walks.pivot_table(index="place", columns="model", values="errors", aggfunc="mean")
     of_routes = means[[PERFECT, body, RANDOM]].to_numpy(float)
-    return (share_of(of_routes.mean(axis=0)), *interval(of_routes, share_of))
+    ends = bootstrap(len(of_routes), lambda rows: share_of(of_routes[rows].mean(axis=0)), SAMPLES)
+    return share_of(of_routes.mean(axis=0)), *ends
 
 
 def share_of(errors: np.ndarray) -> float:
     """The share of errors (perfect memory, mushroom body, random); nan where random makes as many as perfect memory."""
     perfect, body, random = errors
     return float((body - perfect) / (random - perfect)) if random != perfect else math.nan
-
-
-def interval(of_routes: np.ndarray, statistic) -> tuple[float, float]:
-    """95 % interval of a statistic of means over routes: a percentile bootstrap that draws routes.
-
-    Args:
-        of_routes: (routes, columns)
-        statistic: Of the means (columns,) over routes.
-
-    Returns:
-        Both ends; nan for fewer than MIN_ROUTES.
-    """
-    if len(of_routes) < MIN_ROUTES:
-        return math.nan, math.nan
-    drawn = np.random.default_rng(0).integers(len(of_routes), size=(SAMPLES, len(of_routes)))
-    low, high = np.nanquantile([statistic(means) for means in of_routes[drawn].mean(axis=1)], [0.025, 0.975])
-    return float(low), float(high)
 
 
 def _errors(results: StudyResults, model: str) -> dict[str, float]:

@@ -18,6 +18,7 @@ from tussock.world.meshes.reading import MeshReading
 from tussock.world.params import is_generated
 from tussock.world.progress import Progress
 from tussock.world.route_files import write_route
+from tussock.world.route_points import TEXT_SUFFIXES
 from tussock.world.scene import World
 from tussock.world.settings import settings, whole
 
@@ -29,7 +30,7 @@ from ...sweeps.spec import Change, Sweep
 
 log = logging.getLogger(__name__)
 
-ROUTE_SUFFIXES = (".bin", ".csv", ".txt", ".mat", ".npy")
+ROUTE_SUFFIXES = (".bin", ".mat", ".npy", ".npz", *filter(None, TEXT_SUFFIXES))
 
 
 class Parameter(NamedTuple):
@@ -156,14 +157,32 @@ def routes_in(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) 
     return [{"world": world, "world_seed": each, "route_seed": each} for each in range(seed, seed + count)]
 
 
-def laid_out(protocol: Protocol, routes: list[Change], folder: Path) -> list[Change]:
-    """Routes as the protocol lays them out, each in a file in a folder, where it does so; otherwise the routes themselves.
+def prepared(protocol: Protocol, routes: list[Change], folder: Path) -> list[Change]:
+    """Worlds and routes as the protocol prepares and lays them out, in files; otherwise as they are.
 
     Args:
         protocol: The experiment.
         routes: Worlds with one route each; see `routes_in`.
-        folder: For the files, which are replaced.
+        folder: For the files. Those of the same names are replaced.
     """
+    return _laid_out(protocol, _in_prepared_world(protocol, routes, folder), folder / "routes")
+
+
+def _in_prepared_world(protocol: Protocol, routes: list[Change], folder: Path) -> list[Change]:
+    given = routes[0]["world"]  # all have the same, where it is a file
+    if protocol.prepare_world is None or is_generated(given):
+        return routes
+    world = read_world(given, routes[0].get("reading", MeshReading()))
+    if (changed := protocol.prepare_world(world)) is world:
+        return routes
+    path = folder / f"world-{content_of(changed)[:8]}.glb"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        write_world(changed, path)
+    return [{**each, "world": str(path.resolve()), "reading": MeshReading()} for each in routes]
+
+
+def _laid_out(protocol: Protocol, routes: list[Change], folder: Path) -> list[Change]:
     if protocol.layout is None:
         return routes
     folder.mkdir(parents=True, exist_ok=True)
@@ -201,14 +220,14 @@ class DatabaseProtocol:
     """A published experiment on published images, in which nothing walks.
 
     Attributes:
-        name: As of a `Protocol`, and so are the others that it has as well.
-        title: See there.
-        paper: See there.
-        question: See there.
-        parameters: See there.
-        differences: See there.
-        claims: See there.
-        items: See there.
+        name: Name of the command.
+        title: Of the report.
+        paper: Authors, year, title and journal.
+        question: What the experiment asks.
+        parameters: Of the original, and what they are here.
+        differences: From the original, a sentence each.
+        claims: What the paper claims.
+        items: Figures and tables of the report.
         measure: Computes the results from the folder of the images, a seed, and a function that is called with how much is done.
     """
 
@@ -228,7 +247,7 @@ def route_files(given: list[Path], names: Sequence[str] = (), world: Path | None
 
     Args:
         given: The paths.
-        names: Names of the files, without endings, that are taken of a folder which has any of them; of another folder all are.
+        names: Names of files, without endings. Of a folder that has any of these they are taken, of another folder all files.
         world: File of the world, which may be in the same folder.
 
     Raises:
@@ -257,18 +276,3 @@ def route_files(given: list[Path], names: Sequence[str] = (), world: Path | None
             )
         files += published or inside
     return files
-
-
-def prepared_world(protocol: Protocol, world: str, reading: MeshReading, folder: Path) -> str:
-    """The world that a protocol's agents walk in: a file in the folder, where it prepares the world of a file; else as given."""
-    if protocol.prepare_world is None or is_generated(world):
-        return world
-    read = read_world(world, reading)
-    prepared = protocol.prepare_world(read)
-    if prepared is read:
-        return world
-    path = folder / f"world-{content_of(prepared)[:8]}.glb"
-    if not path.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        write_world(prepared, path)
-    return str(path)
