@@ -1,15 +1,8 @@
 """What README and docs print is what was measured."""
 
-import sys
-from pathlib import Path
-
+import make
 import pytest
-
-NUMBERS = Path(__file__).parents[1] / "docs" / "numbers"
-sys.path.insert(0, str(NUMBERS))
-
-import make  # noqa: E402
-from measurements import MEASUREMENTS  # noqa: E402
+from measurements import MEASUREMENTS
 
 
 @pytest.mark.parametrize("page", make.PAGES, ids=lambda path: path.stem)

@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
+from tussock.navigation.models import MODELS as REGISTRY
 
 ROOT = Path(__file__).parents[2]
 SUSSEX = ROOT.parent / "shared" / "sussex"  # the world and routes of the study; they are not part of the project
@@ -141,20 +142,8 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
     }
 
 
-MODELS = [
-    "random",
-    "visual-compass",
-    "perfect-memory",
-    "chain",
-    "mlp",
-    "mlp-rotation",
-    "mlp-mixture",
-    "adaboost",
-    "rbm",
-    "autoencoder",
-    "infomax",
-    "mushroom-body",
-]
+NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
+MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = {
     "walk": Measurement(
         "`tussock run --seed 9 --offset-m 0.1`",

@@ -56,7 +56,7 @@ class SnapshotModel(FamiliarityModel, Protocol):
 
 @runtime_checkable
 class Following(Protocol):
-    """One walk along the sequence of views that a `SequenceModel` learned. It remembers where the walk is."""
+    """One walk along what a `SequenceModel` learned. Where it has `resume(progress)`, it is told where it was put back."""
 
     @property
     def progress(self) -> float | None:
