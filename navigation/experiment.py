@@ -22,6 +22,7 @@ from tussock.world.settings import converted, instance_of, number, settings
 from tussock.world.specs import Spec, takes
 
 from .body import Body
+from .devices import check_device, chosen_device
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -97,7 +98,7 @@ class Experiment(Surroundings):
         body: How the agent moves.
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
         stopping: When the walk ends.
-        device: Where the model learns and scans: "cpu", "cuda", or another device of torch.
+        device: Where the model learns and scans: "cpu", "cuda", another device of torch, or "auto": a GPU, if any.
     """
 
     encoding: "Encoding" = converted(default="edges", converter=_encoding, takes_self=True)
@@ -107,11 +108,10 @@ class Experiment(Surroundings):
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
     start_offset: float = number(0.0, unit="m")
     stopping: StoppingRules = instance_of(StoppingRules, attrs.Factory(StoppingRules), "StoppingRules")
-    device: str = attrs.field(default="cpu")
+    device: str = attrs.field(default="cpu", converter=chosen_device)
 
     def __attrs_post_init__(self):
         from .models.base import FamiliarityModel
-        from .models.checks import check_device
         from .steering.navigator import Navigator
 
         super().__attrs_post_init__()

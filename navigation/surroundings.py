@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import attrs
 
+from tussock.render.backends import BACKENDS
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 S = TypeVar("S", bound="Surroundings")
 
-BACKENDS = ("auto", "cpu", "egl", "osmesa")
 GROUNDS = ("flat", "mesh")
 OF_WORLDS = (
     "world",

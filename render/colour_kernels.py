@@ -5,6 +5,8 @@ corners. So `d ~ w_a a + w_b b + w_c c`, and by Cramer's rule the weights are `w
 sum. They are linear in `d`, so within a column of rays (`d = (cos az, sin az, t)`) each is a number plus t times another one.
 """
 
+import math
+
 import numpy as np
 
 from . import culling_kernels
@@ -75,15 +77,14 @@ def _sample(texels, textures, k, u, v):
     offset, width, height = textures[k, 0], textures[k, 1], textures[k, 2]
     wrap_u, wrap_v, linear = textures[k, 3], textures[k, 4], textures[k, 5]
     x, y = u * width - 0.5 * linear, v * height - 0.5 * linear
-    left, top = np.floor(x), np.floor(y)
-    i, j = np.int64(left), np.int64(top)
+    i, j = math.floor(x), math.floor(y)
     i0, j0 = _wrapped(i, width, wrap_u), _wrapped(j, height, wrap_v)
     t0 = _texel(texels, offset, width, i0, j0)
     if linear == 0:
         return t0, t0, t0, t0, 0.0, 0.0
     i1, j1 = _wrapped(i + 1, width, wrap_u), _wrapped(j + 1, height, wrap_v)
     t1, t2 = _texel(texels, offset, width, i1, j0), _texel(texels, offset, width, i0, j1)
-    return t0, t1, t2, _texel(texels, offset, width, i1, j1), x - left, y - top
+    return t0, t1, t2, _texel(texels, offset, width, i1, j1), x - i, y - j
 
 
 @compiled(error_model="numpy", inline="always")
@@ -124,7 +125,7 @@ def _channel(at, has_texture, corner_colours, products, label, channel, a, b, c)
 
 
 @compiled(error_model="numpy", inline="always")
-def _ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, t):
+def ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, t):
     """The colour of a ray, packed as `Paint.colours` are."""
     a, b, c = _shares(weights, t)
     at = np.int64(0), np.int64(0), np.int64(0), np.int64(0), 0.0, 0.0
@@ -153,7 +154,7 @@ def colour_rays(lookup, colours, directions, tangents, view, keys):
                 continue
             if label != before:
                 before, weights = label, weights_along(corners, label, view, directions[0, j], directions[1, j])
-            keys[j, r] = _ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, tangents[r])
+            keys[j, r] = ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, tangents[r])
 
 
 @compiled

@@ -9,9 +9,12 @@ from types import ModuleType
 from typing import Any
 
 import numba
+from numba.core import config as numba_config
 from numba.core import event
 
 log = logging.getLogger(__name__)
+config: Any = numba_config  # its names are made when it is imported
+SIMULATED = bool(config.ENABLE_CUDASIM)  # whether numba simulates a GPU, which is for tests
 
 
 def compiled(function: Callable | None = None, *, uses: Sequence[ModuleType] = (), **options: Any) -> Any:

@@ -18,7 +18,7 @@ ATAN_ERROR = 1e-6  # rad; the polynomial is within 2e-7
 _ATAN_32, _HALF_TURN, _TINY = tuple(map(np.float32, _ATAN)), np.float32(np.pi), np.float32(1e-30)
 _HUGE, _INF, _SLACK = np.float32(1e30), np.float32(np.inf), np.float32(1e-6)
 _MORE, _BULGE = np.float32(1.000002), np.float32(0.5 * np.pi - 1)
-_ERROR_32 = np.float32(5e-6)  # rad; with the rounding of what columns and rows are computed from
+ERROR_32 = np.float32(5e-6)  # rad; with the rounding of what columns and rows are computed from
 
 
 class View(NamedTuple):
@@ -57,7 +57,7 @@ def row_of(tangent, view):
 
 @compiled(error_model="numpy")
 def _atan2_32(y, x):
-    """`_atan2` in float32, within _ERROR_32 (rad)."""
+    """`_atan2` in float32, within ERROR_32 (rad)."""
     ax, ay, zero = abs(x), abs(y), np.float32(0)
     q = min(ax, ay) / (max(ax, ay) + _TINY)
     s = q * q
@@ -132,7 +132,7 @@ def find_candidates(corners, n, view, work, found):
     """
     zero, one, start, stop = np.float32(0), np.float32(1), np.float32(view.start), np.float32(view.stop)
     wide, per_rad, _, top, rows_per_rad = _in_float32(view)
-    pad, row_pad = _ERROR_32 * per_rad + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
+    pad, row_pad = ERROR_32 * per_rad + np.float32(1e-5), ERROR_32 * rows_per_rad + np.float32(1e-5)
     turns, bottom_row, half = np.float32(1 / view.width), np.float32(view.height - 1), np.float32(0.5) * wide - pad
     _find_corners(corners, n, view, work)
     for i in range(n):  # without branches, so that it is vectorised
@@ -195,7 +195,7 @@ def find_boxes(boxes, begin, n, view, work):
     zero, one, start, stop = np.float32(0), np.float32(1), np.float32(view.start), np.float32(view.stop)
     x, y, z, bottom = view.x, view.y, view.z, np.float32(view.height - 1)
     wide, per_rad, middle, top, rows_per_rad = _in_float32(view)
-    pad, row_pad = _ERROR_32 + np.float32(1e-5), _ERROR_32 * rows_per_rad + np.float32(1e-5)
+    pad, row_pad = ERROR_32 + np.float32(1e-5), ERROR_32 * rows_per_rad + np.float32(1e-5)
     for i in range(n):  # without branches, so that it is vectorised
         k = begin + i
         x0, y0, z0 = np.float32(boxes[0, k] - x), np.float32(boxes[1, k] - y), np.float32(boxes[2, k] - z)

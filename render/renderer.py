@@ -5,10 +5,9 @@ from typing import Protocol, runtime_checkable
 from tussock.world.errors import SettingError
 from tussock.world.scene import World
 
+from .backends import BACKENDS
 from .eye import Eye
 from .poses import Poses, Views
-
-BACKENDS = ("auto", "cpu", "egl", "osmesa")
 
 
 @runtime_checkable
@@ -18,7 +17,7 @@ class Renderer(Protocol):
     Attributes:
         world: The world.
         eye: The eye.
-        backend: Name of the renderer: "cpu", "egl" or "osmesa".
+        backend: Name of the renderer: "cpu", "cuda", "egl" or "osmesa".
     """
 
     world: World
@@ -57,9 +56,10 @@ def open_renderer(
     Args:
         world: The world.
         eye: The eye; None is the default `Eye`.
-        backend: "cpu" (exact), "egl" or "osmesa" (OpenGL through pyrender), or "auto": the fastest. On every machine measured so
-            far (CHANGELOG.md) that is the CPU renderer. `Renderer.backend` is the one chosen.
-        threads: Threads of the CPU renderer; None uses every core that this process may run on. OpenGL decides itself.
+        backend: "cpu" (exact), "cuda" (the same on a GPU of NVIDIA), "egl" or "osmesa" (OpenGL through pyrender), or "auto": the fastest.
+            For one view at a time, on every machine measured so far (CHANGELOG.md), that is the CPU renderer. `Renderer.backend` is the
+            one chosen.
+        threads: Threads of the CPU renderer; None uses every core that this process may run on. The others decide themselves.
 
     Raises:
         SettingError: The renderer's name is unknown.
@@ -72,6 +72,10 @@ def open_renderer(
         from .scanline import ScanlineRenderer
 
         return ScanlineRenderer(world, eye, threads)
+    if backend == "cuda":
+        from .cuda import CudaRenderer
+
+        return CudaRenderer(world, eye)
     from .raster import RasterRenderer
 
     return RasterRenderer(world, eye, backend)

@@ -21,13 +21,13 @@ def _cross(a, b):
 
 
 @compiled(inline="always")
-def _corner(corners, k, i, view):
+def corner(corners, k, i, view):
     """Corner k of triangle i, seen from the eye."""
     return corners[0, k, i] - view.x, corners[1, k, i] - view.y, corners[2, k, i] - view.z
 
 
 @compiled(error_model="numpy", inline="always")
-def _bound(a, b, volume):
+def bound(a, b, volume):
     """The bound p cos az + q sin az + (low or high) on t by the edge (a, b). A bound from below has high = inf, others low = -inf."""
     nx, ny, nz = _cross(a, b)
     upright = abs(nz) < 1e-200  # then the bound is about +-1e200 and allows all of a column or nothing ..
@@ -39,14 +39,14 @@ def _bound(a, b, volume):
 
 
 @compiled(inline="always")
-def _covered(ab, bc, ca, cos, sin):
+def covered(ab, bc, ca, cos, sin):
     """The least and the greatest t in a column between the bounds of three edges; the triangle is not in it where least > greatest."""
     t0, t1, t2 = ab[0] * cos + ab[1] * sin, bc[0] * cos + bc[1] * sin, ca[0] * cos + ca[1] * sin
     return max(t0 + ab[2], t1 + bc[2], t2 + ca[2]), min(t0 + ab[3], t1 + bc[3], t2 + ca[3])
 
 
 @compiled(error_model="numpy", inline="always")
-def _depth_plane(a, b, c, volume):
+def depth_plane(a, b, c, volume):
     """The vector whose product with a ray is the inverse distance."""
     # It is also the sum of the edges' normals, but only the differences of corners give it precisely.
     gx, gy, gz = _cross((b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2]))
@@ -118,19 +118,19 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
         for k in range(candidates):
             i = found[k]
             first, last = np.int64(work[6 * LEAF + i]), np.int64(work[7 * LEAF + i])
-            a, b, c = _corner(corners, 0, i, view), _corner(corners, 1, i, view), _corner(corners, 2, i, view)
+            a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
             nx, ny, nz = _cross(b, c)
             volume = a[0] * nx + a[1] * ny + a[2] * nz
             if abs(volume) < 1e-200 or (cull and volume > 0.0):  # seen from its edge, or from its back
                 continue
-            ab, bc, ca = _bound(a, b, volume), _bound(b, c, volume), _bound(c, a, volume)
-            gx, gy, gz = _depth_plane(a, b, c, volume)
+            ab, bc, ca = bound(a, b, volume), bound(b, c, volume), bound(c, a, volume)
+            gx, gy, gz = depth_plane(a, b, c, volume)
             if last < width:
                 first, last = max(first, start), min(last, stop - 1)
             for column in range(first, last + 1):
                 wrapped = column - width if column >= width else column
                 cos, sin = directions[0, np.uintp(wrapped)], directions[1, np.uintp(wrapped)]
-                low, high = _covered(ab, bc, ca, cos, sin)
+                low, high = covered(ab, bc, ca, cos, sin)
                 pairs[0, count], pairs[1, count] = wrapped, labels[begin + i]
                 spans[0, count], spans[1, count], spans[2, count], spans[3, count] = low, high, gx * cos + gy * sin, gz
                 count += (low <= high) & (wrapped >= start) & (wrapped < stop)
@@ -138,6 +138,13 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
                     _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
                     count = 0
         _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
+
+
+@compiled
+def find_directions(azimuths, heading, directions):
+    """Write the cosines and sines of the azimuths of columns in the world, relative to the heading (rad), into directions (2, width)."""
+    for j in range(len(azimuths)):  # by elements: numba compiles a check of shapes, with its message, for 2 s
+        directions[0, j], directions[1, j] = np.cos(azimuths[j] + heading), np.sin(azimuths[j] + heading)
 
 
 @compiled(uses=(colour_kernels, culling_kernels))
@@ -158,8 +165,7 @@ def draw_views(triangles, rays, paint, lookup, poses, start, stop, keys, views):
     directions = np.empty((2, width))
     for i in range(len(poses)):
         x, y, heading, z = poses[i]
-        for j in range(width):  # by elements: numba compiles a check of shapes, with its message, for 2 s
-            directions[0, j], directions[1, j] = np.cos(azimuths[j] + heading), np.sin(azimuths[j] + heading)
+        find_directions(azimuths, heading, directions)
         view = View(x, y, z, heading, top, rows_per_rad, width, height, start * n, stop * n)
         keys[start * n : stop * n] = 0
         _draw(triangles, directions, tangents, view, keys, lookup)

@@ -404,7 +404,7 @@ BAD = {
     "an unknown encoding": (["run", *SMALL, "--encoding", "smell", "--out", "r"], ["'smell'", "grey, sky, edges"]),
     "an unknown renderer": (
         ["run", *SMALL, "--renderer", "vulkan", "--out", "r"],
-        ["'vulkan'", "auto, cpu, egl, osmesa"],
+        ["'vulkan'", "auto, cpu, cuda, egl, osmesa"],
     ),
     "an unknown navigator": (["run", *SMALL, "--navigator", "pilot", "--out", "r"], ["'pilot'", "scan"]),
     "a scan of 0 degrees": (["evaluate", *SMALL, "--scan-deg", "0"], ["--scan-deg 0", "360"]),

@@ -22,6 +22,7 @@ from tussock.navigation.body import Body
 from tussock.navigation.cli.main import choice_of, commands_for, main
 from tussock.navigation.cli.models import RunCommand
 from tussock.navigation.cli.options import RunOptions
+from tussock.navigation.devices import chosen_device
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import ROUTE_SETTINGS, WALK_SETTINGS, key_of, route_key, training_key
@@ -30,8 +31,9 @@ from tussock.navigation.models import MODELS, PerfectMemory
 from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.steering import NAVIGATORS, Motion, Scan
 from tussock.navigation.stopping import StoppingRules
-from tussock.navigation.surroundings import BACKENDS, Surroundings
+from tussock.navigation.surroundings import Surroundings
 from tussock.navigation.training_setup import TrainingSetup
+from tussock.render.backends import BACKENDS
 from tussock.render.eye import Eye
 from tussock.render.images import Grid, write_database
 from tussock.render.renderer import open_renderer
@@ -204,6 +206,17 @@ def test_settings_are_checked_together_and_not_against_the_defaults_of_others(to
     expected = {"top_deg": math.degrees(eye.top), "bottom_deg": math.degrees(eye.bottom), "samples": eye.samples}
     expected |= {"size": f"{eye.width}x{eye.height}"}
     assert all(expected[name] == pytest.approx(value) for name, value in together.items())
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_auto_is_a_gpu_where_there_is_one(there, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: there)
+    assert chosen_device("auto") == ("cuda" if there else "cpu")
+    assert chosen_device("cuda:1") == "cuda:1"
+
+
+def test_what_ran_on_a_device_says_on_which():
+    assert settings_of(Experiment(device="auto"))["device"] == chosen_device("auto")
 
 
 @pytest.mark.parametrize(

@@ -159,7 +159,7 @@ def test_poses_that_are_not_finite_are_refused(renderer, pose):
 
 
 def test_an_unknown_renderer_is_refused_with_the_known_ones():
-    with pytest.raises(InputError, match="cpu, egl, osmesa"):
+    with pytest.raises(InputError, match="cpu, cuda, egl, osmesa"):
         open_renderer(random_world(), Eye(), "vulkan")
 
 

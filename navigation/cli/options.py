@@ -185,7 +185,7 @@ class LearningOptions(SourceOptions):
     parallel_views: int = default(TrainingSetup, "parallel_views")
     """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
     device: str = default(Experiment, "device")
-    """Where the model learns and scans: cpu, cuda, or another device of torch's."""
+    """Where the model learns and scans: cpu, cuda, another device of torch's, or auto: a GPU where there is one."""
 
 
 @dataclass

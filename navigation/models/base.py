@@ -14,8 +14,9 @@ from tussock.world.errors import SettingError
 from tussock.world.settings import instance_of, whole
 from tussock.world.specs import format_spec, own_parameters
 
+from ..devices import check_device
 from ..feature_mask import WITH_MASK, FeatureMask, check_takes_partial, is_partial
-from .checks import MAX_COLUMNS, MAX_VALUE, Images, all_bounded, check_device, check_scan, check_training
+from .checks import MAX_COLUMNS, MAX_VALUE, Images, all_bounded, check_scan, check_training
 from .filter_bank import FilterBank
 from .registry import MODELS
 from .rotations import in_batches
@@ -69,7 +70,6 @@ class Following(Protocol):
         """Compare a view with what was learned near the present progress, and move the progress to the best match.
 
         Args:
-            view: (h, w)
             allowed: (w,) Rotations whose best match the progress may move to.
 
         Returns:

@@ -1,23 +1,15 @@
-"""What models refuse: devices, views and learned numbers that cannot be used."""
+"""What models refuse: views and learned numbers that cannot be used."""
 
 import torch
 from jaxtyping import Float32
 
-from tussock.world.errors import SettingError, first_line
+from tussock.world.errors import SettingError
 
 # Columns of a view. At the upper limit the engine's matrices for the inverse transform take 67 MB each.
 MIN_COLUMNS, MAX_COLUMNS = 4, 8192
 MAX_VALUE = 1e12  # of a view, or learned: sums of squares over whole views stay far from the largest float32
 
 Images = Float32[torch.Tensor, "n h w"]
-
-
-def check_device(device: str) -> None:
-    """Refuse a device that torch cannot use here. Raises SettingError."""
-    try:
-        torch.zeros(1, device=device).item()
-    except (RuntimeError, AssertionError, TypeError) as error:
-        raise SettingError(f"device {device!r} cannot be used here ({first_line(error)}); give cpu") from error
 
 
 def check_training(views: Images, partial: bool = False) -> None:

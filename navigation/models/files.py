@@ -18,10 +18,10 @@ from tussock.world.errors import FileError, SettingError, first_line
 from tussock.world.settings import instance_of, settings
 from tussock.world.specs import Spec
 
+from ..devices import check_device
 from ..encoding import OLD_NAMES, STEPS, Encoding
 from ..feature_mask import FeatureMask
 from .base import FamiliarityModel, Model
-from .checks import check_device
 from .opponents import OPPONENT, Opponent
 from .registry import MODELS
 from .specs import find_model, make_model, present_names

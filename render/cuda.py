@@ -1,0 +1,129 @@
+"""The CUDA renderer: the panoramas of the CPU renderer (scanline.py), on a GPU of NVIDIA.
+
+Both use the same functions, so that a view is the same, but for the rounding of the GPU (it rounds a product and a sum at once): this could
+be seen where a ray meets an edge, or where two surfaces are equally near.
+"""
+
+from importlib.util import find_spec
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from tussock.world.errors import InputError, MissingDependencyError, first_line
+from tussock.world.scene import World
+
+from .compile import SIMULATED, config
+from .eye import Eye
+from .poses import Poses, Views, poses_of_eye
+from .scanline_kernels import find_directions
+from .scene_arrays import Scene
+
+RAYS, VIEWS = 2**26, 2**15  # drawn at once, at most; a ray takes 8 bytes of the GPU's memory
+WIDE = 2**20  # triangles of many columns in a batch that blocks of threads draw; further ones have a thread each
+BLOCKS = 4096  # of threads that draw wide triangles
+
+
+class CudaRenderer:
+    """Panoramas on a GPU of NVIDIA, a `Renderer`.
+
+    Args:
+        world: The world.
+        eye: The eye.
+
+    Raises:
+        MissingDependencyError: There is no such GPU, or no numba-cuda.
+    """
+
+    backend = "cuda"
+
+    def __init__(self, world: World, eye: Eye):
+        cuda = _cuda()
+        from .cuda_kernels import THREADS, averaging_kernel, clear, drawing_kernels
+
+        self.world, self.eye, self._cuda, self._lock = world, eye, cuda, Lock()
+        scene = Scene.of(world, eye)
+        textured = scene.lookup is not None
+        self._kernels, self._threads = (clear, *drawing_kernels(textured), averaging_kernel(textured)), THREADS
+        triangles, rays, lookup = scene.triangles, scene.rays, scene.lookup or ()
+        size = len(rays.azimuths), len(rays.tangents)
+        self._azimuths, self._numbers = rays.azimuths, (rays.top, rays.rows_per_rad, *size)
+        self._triangles: Any = cuda.to_device(triangles.corners), cuda.to_device(triangles.labels), triangles.cull
+        self._tangents, self._lookup = cuda.to_device(rays.tangents), tuple(map(cuda.to_device, lookup))
+        self._paint: Any = rays.per_pixel, *map(cuda.to_device, scene.paint)
+        self._batch = min(max(1, RAYS // (size[0] * size[1])), VIEWS)
+        self._memory: Any = None  # of a batch on the GPU: keys, pixels, and wide triangles
+        self._open = True
+
+    def __reduce__(self):
+        """In another process it is opened anew."""
+        return CudaRenderer, (self.world, self.eye)
+
+    def render(self, poses: Poses) -> Views:
+        """See `Renderer.render`. Threads take turns."""
+        if not self._open:
+            raise InputError("this renderer is closed; open another one")
+        eyes = poses_of_eye(self.world, self.eye, poses)
+        views = np.empty((len(eyes), self.eye.height, self.eye.width, 4), dtype=np.uint8)
+        with self._lock:
+            for begin in range(0, len(eyes), self._batch):
+                some = slice(begin, begin + self._batch)
+                self._draw(eyes[some], views[some])
+        return views
+
+    def _draw(self, eyes: Float[np.ndarray, "n 4"], views: Views) -> None:
+        """Draw one batch of views."""
+        cuda, threads, (clear, narrow, wide, average) = self._cuda, self._threads, self._kernels
+        n, (*_, columns, rows) = len(eyes), self._numbers
+        directions = np.empty((n, 2, columns))
+        for eye, those in zip(eyes, directions, strict=True):
+            find_directions(self._azimuths, eye[2], those)
+        if self._memory is None or len(self._memory[0]) < n:
+            self._memory = None  # the former memory is free before more is taken
+            pixels = cuda.device_array((n, self.eye.height, self.eye.width), np.uint32)
+            keys = cuda.device_array((n, columns, rows), np.int64)
+            self._memory = keys, pixels, cuda.device_array(WIDE, np.int64), cuda.device_array(1, np.int64)
+        keys, pixels, queue, queued = self._memory
+        keys, pixels = keys[:n], pixels[:n]
+        clear[(-(-columns * rows // threads), n), threads](keys, queued)
+        where = self._numbers, self._tangents, cuda.to_device(eyes), cuda.to_device(directions), self._lookup, keys
+        triangles = len(self._triangles[1])
+        if triangles:
+            narrow[(-(-triangles // threads), n), threads](*self._triangles, *where, queue, queued)
+            wide[BLOCKS, threads](*self._triangles, *where, queue, queued)
+        average[(-(-pixels[0].size // threads), n), threads](*where, *self._paint, pixels)
+        pixels.copy_to_host(views.view("<u4")[..., 0])
+
+    def close(self) -> None:
+        """Free the memory on the GPU."""
+        self._open = False
+        self._triangles = self._tangents = self._lookup = self._paint = self._memory = None
+
+    def __enter__(self) -> "CudaRenderer":
+        return self
+
+    def __exit__(self, kind, error, traceback) -> None:
+        self.close()
+
+
+def _cuda() -> Any:
+    """The module numba.cuda. Raises MissingDependencyError where it cannot be used."""
+    if find_spec("numba_cuda") is None and not SIMULATED:
+        raise MissingDependencyError(
+            "the cuda renderer needs numba-cuda; install it with pip install 'tussock[cuda]', or use the cpu renderer"
+        )
+    from numba import cuda
+
+    config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # they advise to start larger jobs, and one view is a small one
+    if not cuda.is_available():
+        try:
+            cuda.detect()
+        except Exception as error:
+            reason = first_line(error)
+        else:
+            reason = "no device was found"
+        raise MissingDependencyError(
+            f"the cuda renderer needs a GPU of NVIDIA and its driver ({reason}); use the cpu renderer"
+        )
+    return cuda
