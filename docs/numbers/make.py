@@ -26,7 +26,8 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite.binding
-from measurements import MEASUREMENTS, Measurement, NeedsSussex
+from measurement import Measurement, NeedsSussex
+from measurements import MEASUREMENTS
 
 ROOT = Path(__file__).parents[2]
 RECORDS = Path(__file__).parent / "records"
