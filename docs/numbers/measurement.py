@@ -1,6 +1,7 @@
 """A measurement: something that is run for the numbers that README and docs print; and what measurements run."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -37,10 +38,10 @@ class Measurement:
     slow: bool = False
 
 
-def tussock(folder: Path, *arguments: object) -> Values:
-    """What a command of tussock reports."""
+def tussock(folder: Path, *arguments: object, environment: Mapping[str, str] | None = None) -> Values:
+    """What a command of tussock reports, with further variables of the environment."""
     command = [sys.executable, "-m", "tussock", *map(str, arguments), "--json"]
-    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True, env=os.environ | (environment or {}))
     if done.returncode != 0:
         raise SystemExit(f"failed: {' '.join(command)}")
     return json.loads(done.stdout)

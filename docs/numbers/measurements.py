@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import comparison
+import processors
 import protocols
 from measurement import ROOT, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
@@ -60,32 +62,40 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
 
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
-MEASUREMENTS = protocols.MEASUREMENTS | {
-    "walk": Measurement(
-        "`tussock run --seed 9 --offset-m 0.1`",
-        measure_walk,
-        {
-            "deviation": lambda values: f"{100 * values['mean_deviation_m']:.1f} cm",
-            "steps": lambda values: str(values["steps"]),
-        },
-    ),
-    "learning-walks": Measurement(
-        "a sweep of `learning-walk-m`, `offset-m`, `heading-noise-deg` and `seed`",
-        measure_learning_walks,
-        with_and_without("0") | with_and_without("10"),
-        slow=True,
-    ),
-    "learning-walks-sussex": Measurement(
-        "a sweep of `route`, `learning-walk-m`, `offset-m` and `heading-noise-deg`",
-        measure_learning_walks_sussex,
-        with_and_without("0") | with_and_without("10"),
-        slow=True,
-    ),
-    "test-bed": Measurement(
-        "`tussock benchmark --model NAME`",
-        measure_test_bed,
-        {model: lambda values, model=model: f"{values['arrived'][model]:.0%}".replace("%", " %") for model in MODELS}
-        | {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
-        slow=True,
-    ),
-}
+MEASUREMENTS = (
+    comparison.MEASUREMENTS
+    | processors.MEASUREMENTS
+    | protocols.MEASUREMENTS
+    | {
+        "walk": Measurement(
+            "`tussock run --seed 9 --offset-m 0.1`",
+            measure_walk,
+            {
+                "deviation": lambda values: f"{100 * values['mean_deviation_m']:.1f} cm",
+                "steps": lambda values: str(values["steps"]),
+            },
+        ),
+        "learning-walks": Measurement(
+            "a sweep of `learning-walk-m`, `offset-m`, `heading-noise-deg` and `seed`",
+            measure_learning_walks,
+            with_and_without("0") | with_and_without("10"),
+            slow=True,
+        ),
+        "learning-walks-sussex": Measurement(
+            "a sweep of `route`, `learning-walk-m`, `offset-m` and `heading-noise-deg`",
+            measure_learning_walks_sussex,
+            with_and_without("0") | with_and_without("10"),
+            slow=True,
+        ),
+        "test-bed": Measurement(
+            "`tussock benchmark --model NAME`",
+            measure_test_bed,
+            {
+                model: lambda values, model=model: f"{values['arrived'][model]:.0%}".replace("%", " %")
+                for model in MODELS
+            }
+            | {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
+            slow=True,
+        ),
+    }
+)
