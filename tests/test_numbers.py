@@ -1,8 +1,11 @@
 """What README and docs print is what was measured."""
 
+import cv2
 import make
+import numpy as np
 import pytest
 from measurements import MEASUREMENTS
+from pictures import ASSETS, digest, keep
 
 
 @pytest.mark.parametrize("page", make.PAGES, ids=lambda path: path.stem)
@@ -27,3 +30,22 @@ def test_a_number_that_differs_from_its_record_is_seen():
 @pytest.mark.slow
 def test_a_measurement_gives_its_record_again(tmp_path):
     assert MEASUREMENTS["walk"].measure(tmp_path) == make.records()["walk"]["values"]
+
+
+def test_the_pictures_are_those_of_the_records():
+    """A picture that was replaced by hand, or is of no measurement, is seen."""
+    kept = {
+        name: value for each in make.records().values() for name, value in each["values"].get("pictures", {}).items()
+    }
+    assert kept == {path.relative_to(ASSETS).as_posix(): digest(path) for path in ASSETS.rglob("*.png")}
+
+
+def test_a_picture_is_replaced_only_where_it_looks_different(tmp_path, monkeypatch):
+    monkeypatch.setattr("pictures.ASSETS", tmp_path)
+    old, noisy, other = (np.full((64, 64, 3), 100, np.uint8) for _ in range(3))
+    noisy[::8, ::8] += 20
+    other[16:32, 16:32] += 20
+    for picture, kept in ((old, old), (noisy, old), (other, other)):
+        cv2.imwrite(str(tmp_path / "new.png"), picture)
+        keep(tmp_path / "new.png", "picture.png")
+        assert (cv2.imread(str(tmp_path / "picture.png")) == kept).all()

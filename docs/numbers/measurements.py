@@ -4,6 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import comparison
+import eyes
+import pictures
 import processors
 import protocols
 from measurement import ROOT, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
@@ -12,12 +14,6 @@ from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
 from tussock.navigation.models import MODELS as REGISTRY
 
 RESULTS = ROOT / "docs" / "benchmark"  # of the test bed
-
-
-def measure_walk(folder: Path) -> Values:
-    """The walk of README's picture."""
-    summary = tussock(folder, "run", "--seed", 9, "--offset-m", 0.1, "--out", "run")
-    return {name: summary[name] for name in ("steps", "mean_deviation_m", "reason")}
 
 
 def measure_learning_walks(folder: Path) -> Values:
@@ -64,17 +60,11 @@ NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in 
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
     comparison.MEASUREMENTS
+    | eyes.MEASUREMENTS
+    | pictures.MEASUREMENTS
     | processors.MEASUREMENTS
     | protocols.MEASUREMENTS
     | {
-        "walk": Measurement(
-            "`tussock run --seed 9 --offset-m 0.1`",
-            measure_walk,
-            {
-                "deviation": lambda values: f"{100 * values['mean_deviation_m']:.1f} cm",
-                "steps": lambda values: str(values["steps"]),
-            },
-        ),
         "learning-walks": Measurement(
             "a sweep of `learning-walk-m`, `offset-m`, `heading-noise-deg` and `seed`",
             measure_learning_walks,
