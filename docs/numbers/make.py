@@ -9,7 +9,7 @@ Each is recorded in records/NAME.json: its values, and the command, commit, proc
 
     <!-- number: NAME.PART -->1.1 cm<!-- end of number -->
 
-between which the record's text stands. Between `<!-- numbers: origin -->` and `<!-- end of numbers -->` stands where the numbers of
+between which the record's text stands. Pictures are drawn into assets; their records have a digest of each. Between `<!-- numbers: origin -->` and `<!-- end of numbers -->` stands where the numbers of
 a page come from.
 """
 
@@ -26,7 +26,8 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite.binding
-from measurements import MEASUREMENTS, Measurement, NeedsSussex
+from measurement import Measurement, NeedsSussex
+from measurements import MEASUREMENTS
 
 ROOT = Path(__file__).parents[2]
 RECORDS = Path(__file__).parent / "records"
