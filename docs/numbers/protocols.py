@@ -3,6 +3,8 @@
 import json
 import math
 import re
+import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -54,11 +56,50 @@ def in_sussex(argument: str) -> str:
 
 def replicated(folder: Path, name: str, *arguments: str) -> Values:
     """What `tussock replicate` reports, with the seconds of all times that it was begun in the folder."""
-    times = folder / f"{name}.seconds"
+    began = time.monotonic()
     done = tussock(folder, "replicate", *arguments, "--out", name, "--overwrite")
-    with times.open("a") as file:
-        file.write(f"{done.get('seconds', 0)}\n")
-    return done | {"seconds": sum(map(float, times.read_text().split()))}
+    with (folder / f"{name}.seconds").open("a") as file:
+        file.write(f"{time.monotonic() - began:.1f}\n")
+    return done | {"seconds": sum(map(float, (folder / f"{name}.seconds").read_text().split()))}
+
+
+def measure_thesis(folder: Path) -> Values:
+    """The studies of the thesis in three generated worlds."""
+    done = replicated(folder, "thesis", "thesis")
+    claims = json.loads((folder / "thesis" / "results.json").read_text())["claims"]
+    kept = ("test", "published", "obtained", "holds", "effects", "reason")
+    return {
+        "seconds": done["seconds"],
+        "claims": {key: {part: claim[part] for part in kept} for key, claim in claims.items()},
+    }
+
+
+def thesis_table(values: Values) -> str:
+    """Each claim of the thesis: published numbers, those obtained in each world, and in how many worlds it holds."""
+    rows = []
+    for key, claim in values["claims"].items():
+        tested = [each for each in claim["holds"] if each is not None]
+        obtained = (f"{label}: {spread(each)}" for label, each in claim["obtained"].items())
+        holds = f"{sum(tested)} of {len(tested)}" if tested else f"not tested: {claim['reason']}"
+        rows.append([f"`{key}`", listed(claim["published"]) or "-", "; ".join(obtained), effects(claim), holds])
+    effect = "size of the effect in each world (95 % interval)"
+    return markdown(["claim", "published", "obtained: median (lowest to highest)", effect, "holds in"], rows)
+
+
+def thesis_count(values: Values) -> str:
+    """How many claims hold in all worlds, in some, and in none."""
+    counts = Counter(
+        "not tested" if not tested else "hold in all worlds" if all(tested) else "in some" if any(tested) else "in none"
+        for tested in ([each for each in claim["holds"] if each is not None] for claim in values["claims"].values())
+    )
+    order = ("hold in all worlds", "in some", "in none", "not tested")
+    return f"of {counts.total()} claims " + ", ".join(f"{counts[each]} {each}" for each in order if counts[each])
+
+
+def spread(obtained: Mapping[str, float | None]) -> str:
+    """A number over several worlds."""
+    median, low, high = (obtained[each] for each in ("median", "lowest", "highest"))
+    return with_interval(median, *((None, None) if low == high else (low, high)))
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -97,16 +138,16 @@ def counted(values: Values) -> str:
 
 
 def claims_table(values: Values) -> str:
-    """Each claim: its test, the published numbers, the obtained ones, the effect with its interval, and whether it holds."""
+    """Each claim: its test, the published numbers where there are any, the obtained ones, the effect, and whether it holds."""
+    claims = values["claims"].values()
+    published = any(claim["published"] for claim in claims)
     rows = []
-    for claim in values["claims"].values():
+    for claim in claims:
         holds = "not tested: " + claim["reason"] if claim["holds"] is None else "yes" if claim["holds"] else "no"
-        rows.append(
-            [claim["test"], listed(claim["published"]) or "-", listed(claim["obtained"]), effects(claim), holds]
-        )
-    return markdown(
-        ["the claim holds if", "published", "obtained", "size of the effect (95 % interval)", "holds"], rows
-    )
+        numbers = [*([listed(claim["published"])] if published else []), listed(claim["obtained"]), effects(claim)]
+        rows.append([claim["test"], *numbers, holds])
+    columns = [*(["published"] if published else []), "obtained", "size of the effect (95 % interval)", "holds"]
+    return markdown(["the claim holds if", *columns], rows)
 
 
 def listed(numbers: Mapping[str, float]) -> str:
@@ -115,7 +156,8 @@ def listed(numbers: Mapping[str, float]) -> str:
 
 def effects(claim: Mapping[str, Any]) -> str:
     known = [each for each in claim["effects"] if each]
-    return "; ".join(f"{e['label']}: {with_interval(e['value'], e['low'], e['high'])}" for e in known) or "-"
+    sizes = "; ".join(with_interval(each["value"], each["low"], each["high"]) for each in known)
+    return f"{known[0]['label']}: {sizes}" if known else "-"
 
 
 def of_models(values: Values, measure: str, digits: int = 1) -> dict[str, str]:
@@ -230,4 +272,8 @@ FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables 
 MEASUREMENTS: dict[str, Measurement] = {
     name: replication(name, arguments, tables=tables, texts=texts)
     for name, (arguments, tables, texts) in FULL_SIZE.items()
+} | {
+    "thesis": Measurement(
+        "`tussock replicate thesis`", measure_thesis, {"claims": thesis_table, "count": thesis_count}, slow=True
+    ),
 }

@@ -20,6 +20,7 @@ from ...reports.drawing import (
 from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
+MAX_TICKS = 8  # at the values themselves
 MARKERS = "osD^vPX"  # seven, so that 35 models look different in five colours
 
 
@@ -49,6 +50,8 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
         ends = np.array([0.0, walks[x].max()])
         axis.plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")
     axis.set(xlabel=xlabel, ylabel=ylabel)
+    if len(values := walks[x].dropna().unique()) <= MAX_TICKS:
+        axis.set_xticks(np.sort(values))
     from_zero(axis)
     axis.grid(axis="y", color="#00000018")
     legend_above(axis)
