@@ -12,7 +12,7 @@ from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
 from .effects import over_routes
-from .figures import boxes
+from .figures import boxes, means_by_model
 from .intervals import INTERVALS, intervals
 from .protocol import Item, Parameter, Protocol
 
@@ -42,10 +42,10 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     walks = walks.assign(failures=walks["resets"], deviation_cm=100 * walks["mean_deviation_m"])
     grouped = walks.groupby("model", sort=False)
     columns = {
-        "routes": grouped.size(),
+        "walks": grouped.size(),
         f"{ANGULAR_ERROR} (°)": grouped["mean_error_deg"].mean(),
         FAIL_COUNT: grouped["failures"].mean(),
-        "routes without a failure": grouped["failures"].agg(lambda each: float((each == 0).mean())),
+        "walks without a failure": grouped["failures"].agg(lambda each: float((each == 0).mean())),
         "arrived": grouped["arrived"].mean(),
         "mean deviation (cm)": grouped["deviation_cm"].mean(),
     }
@@ -130,13 +130,17 @@ ITEMS = (
         "by-model",
         "Errors and failures",
         "by_model",
-        "Over all routes. Angular error: between the chosen heading and the route's heading at the nearest position, mean over the "
+        "Over all walks. Angular error: between the chosen heading and the route's heading at the nearest position, mean over the "
         "steps of a walk. Trial-fail count: how often a walk was put back.",
     ),
-    boxes(
-        "angular-error", "Mean absolute angular error", "mean_error_deg", "mean absolute error (degrees)", of="routes"
+    boxes("angular-error", "Mean absolute angular error", "mean_error_deg", "mean absolute error (degrees)"),
+    Item(
+        "failures",
+        "Failures",
+        "intervals",
+        "Mean number of failures of a walk, with its 95 % interval over routes.",
+        lambda intervals: means_by_model(intervals, FAIL_COUNT, "failures a walk"),
     ),
-    boxes("failures", "Failures", "failures", "failures per route", of="routes"),
     INTERVALS,
     Item("by-route", "Route by route", "by_route", "Mean over the walks along each route."),
 )
