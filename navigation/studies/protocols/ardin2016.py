@@ -1,5 +1,6 @@
 """Ardin et al. 2016: errors along a route, by perfect memory, a mushroom body, Infomax and chance."""
 
+import numpy as np
 import pandas as pd
 
 from tussock.render.eye import Eye
@@ -10,7 +11,7 @@ from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
-from .ardin2016_published import ARDIN2016_AS_PUBLISHED
+from .ardin2016_published import ARDIN2016_AS_PUBLISHED, SHARE, share_of
 from .effects import over_routes
 from .figures import boxes, lines_by_model
 from .protocol import Item, Parameter, Protocol, models_in
@@ -101,15 +102,14 @@ def _perfect_best(results: StudyResults) -> Decision:
 )
 def _body_close(results: StudyResults) -> Decision:
     """The mushroom body follows routes nearly as well as perfect memory."""
-    perfect, body, random = _errors(results, PERFECT, BODY, RANDOM).values()
-    share = (body - perfect) / (random - perfect) if random != perfect else float("nan")
+    share = share_of(np.array([*_errors(results, PERFECT, BODY, RANDOM).values()]))
     effect = over_routes(
-        "mushroom body's errors minus perfect memory's",
+        SHARE,
         results.tables["walks"],
         "errors",
-        lambda mean: mean[BODY] - mean[PERFECT],
+        lambda mean: share_of(mean[[PERFECT, BODY, RANDOM]].to_numpy()),
     )
-    return Decision({"share of the way from perfect memory to random": share}, share <= 0.1, effect)
+    return Decision({SHARE: share}, share <= 0.1, effect)
 
 
 CLAIMS = (_random_worst, _perfect_best, _body_close)
