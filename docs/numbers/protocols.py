@@ -246,7 +246,7 @@ def in_a_line(values: Values) -> str:
     parts = []
     for claim in values["claims"].values():
         holds = "not tested" if claim["holds"] is None else "holds" if claim["holds"] else "does not hold"
-        parts.append(f"{effects(claim) if any(claim['effects']) else listed(claim['obtained'])}: {holds}")
+        parts.append(f"{effects(claim) if any(claim['effects']) else listed(claim['obtained'])}, {holds}")
     return "; ".join(parts)
 
 
