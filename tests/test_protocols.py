@@ -172,7 +172,7 @@ def test_ardin_by_hand():
     assert list(table.columns) == ["5 cm", "25 cm", "all"]
     assert table.loc["perfect-memory"].tolist() == [0.5, 1.5, 1.0]
     assert table.loc["random"].tolist() == [21, 27, 24]
-    assert results.tables["by_route"].set_index("model").loc["infomax"].tolist() == [4, 5, 4.5]
+    assert results.tables["by_route"].set_index("place")["infomax"].tolist() == [4, 5]
     *_, body_close = check_claims(ARDIN2016.claims, [results])
     assert body_close.obtained == [{"share of the way from perfect memory to random": pytest.approx(0.5 / 23)}]
     assert holds(ARDIN2016, results) == {"random-worst": True, "perfect-best": True, "body-close": True}

@@ -37,6 +37,7 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     walks = walks.assign(errors=walks["resets"], displacement_cm=displacement_cm)
     by_displacement = _mean_errors(walks, "displacement_cm")
     by_displacement.columns = [f"{name} cm" if isinstance(name, int) else name for name in by_displacement]
+    by_route = walks.pivot_table(index="place", columns="model", values="errors", aggfunc="mean", sort=False)
     grouped = walks.groupby("model", sort=False)
     overall = grouped["errors"].agg(["mean", "median", "min", "max"]).add_suffix(" errors a walk")
     overall["walks"] = grouped.size()
@@ -46,7 +47,7 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     return StudyResults(
         tables={
             "by_displacement": by_displacement.reset_index(),
-            "by_route": _mean_errors(walks, "place").reset_index(),
+            "by_route": by_route[models_in(walks)].reset_index(),
             "by_model": overall.reset_index(),
             "walks": walks[columns],
         },
