@@ -2,6 +2,7 @@
 
     python benchmarks/ardin_steps.py decisions 100 101 SUSSEX/ant1_route1.bin > decisions.jsonl
     python benchmarks/ardin_steps.py walks 100 101 SUSSEX/ant1_route1.bin > walks.jsonl
+    python benchmarks/ardin_steps.py rates 100 101 > rates.jsonl
 
 A number is the seed of a generated world and route; a file is a route through the world in its folder, SUSSEX/world5000_gray.bin.
 Each line is a result: the mean error (degrees) of decisions, or the number of errors of a walk.
@@ -23,6 +24,7 @@ from tussock.navigation.experiment import steps_of
 from tussock.navigation.models.spiking_mushroom_body import SpikingMushroomBody
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.navigation.studies.protocols import ARDIN2016
+from tussock.world.errors import InputError
 
 PUBLISHED = ARDIN2016.as_published.experiment
 CHAIN = str(PUBLISHED.encoding)
@@ -35,6 +37,7 @@ VIEWS: dict[str, tuple[Eye, str]] = {
 }
 MODELS = ("perfect-memory", "spiking-mushroom-body", "random")
 SPACING, ASIDE = 1.0, (0.0, 0.05, -0.05)  # m, along the route and to its left, of decisions
+RATES = (0.97, 3, 10, 20, 30, 50, 100, 150)  # of Infomax, times the square of the number of pixels
 WINNERS = 200  # Kenyon cells that fire without spikes
 
 
@@ -45,17 +48,38 @@ def surroundings(name: str) -> dict[str, Any]:
     return {"world": str(Path(name).parent / "world5000_gray.bin"), "route": name, "cull_back_faces": True}
 
 
+def views_of(name: str, views: str) -> tuple[Any, torch.Tensor, torch.Tensor]:
+    """An encoding, the learned views, and those of positions on the route and 5 cm next to it, facing along it."""
+    eye, chain = VIEWS[views]
+    base = PUBLISHED.replace(threads=1, eye=eye, encoding=chain, **surroundings(name))
+    world, route = base.open_world_and_route()
+    at = route.at(np.arange(0.5, route.length - 0.5, SPACING))
+    poses = np.array([Pose(*pose).moved(0, aside) for pose in at.tolist() for aside in ASIDE])
+    encoded = base.encoding.for_eye(eye)
+    with base.open_renderer(world) as renderer:
+        learned, _ = base.training_views(renderer, route)
+        return encoded, learned, encoded.at(renderer, poses)
+
+
+def rates(name: str) -> Iterator[dict[str, Any]]:
+    """Mean errors of single decisions of Infomax, by its rate."""
+    for views in ("those of ardin2016", "published"):
+        encoded, learned, seen = views_of(name, views)
+        pixels = make_model("infomax").see(encoded.mask)._size(*learned.shape[1:])
+        of_rates = [f"infomax rate={rate / pixels**2:.3g}" for rate in RATES]
+        for model in ("perfect-memory", "random", *of_rates, "infomax rate=baddeley"):
+            try:
+                trained = make_model(model).see(encoded.mask).fit(learned)
+            except InputError as error:  # the weights grow without bound
+                yield {"where": name, "views": views, "model": model, "failed": str(error)}
+            else:
+                yield decided(name, views, model, trained.scan(seen).numpy())
+
+
 def decisions(name: str) -> Iterator[dict[str, Any]]:
     """Mean errors of single decisions on the route and 5 cm next to it, facing along it."""
-    for views, (eye, chain) in VIEWS.items():
-        base = PUBLISHED.replace(threads=1, eye=eye, encoding=chain, **surroundings(name))
-        world, route = base.open_world_and_route()
-        at = route.at(np.arange(0.5, route.length - 0.5, SPACING))
-        poses = np.array([Pose(*pose).moved(0, aside) for pose in at.tolist() for aside in ASIDE])
-        encoded = base.encoding.for_eye(eye)
-        with base.open_renderer(world) as renderer:
-            learned, _ = base.training_views(renderer, route)
-            seen = encoded.at(renderer, poses)
+    for views in VIEWS:
+        encoded, learned, seen = views_of(name, views)
         for model in ("perfect-memory", "spiking-mushroom-body", "mushroom-body inputs=10 cells=20000"):
             if model.startswith("mushroom") and encoded.mask is not None:
                 continue  # its projection neurons are fields of a panorama
@@ -122,7 +146,7 @@ def errors_of(runs: list[Experiment], world: Any, route: Route) -> list[int]:
 def main(what: str, *names: str) -> None:
     torch.set_num_threads(1)
     for name in names:
-        for result in (decisions if what == "decisions" else walks)(name):
+        for result in {"decisions": decisions, "walks": walks, "rates": rates}[what](name):
             print(json.dumps(result), flush=True)
 
 

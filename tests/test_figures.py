@@ -10,7 +10,8 @@ from figure_laws import check_figure, drawn_texts
 
 from tussock.navigation.reports.drawing import STYLE, canvas, draw_lines, from_zero, legend_above
 from tussock.navigation.reports.layout import fit_texts
-from tussock.navigation.studies.protocols.figures import boxes_by_model, lines_by_model
+from tussock.navigation.studies.protocols.figures import boxes_by_model, lines_by_model, means_by_model
+from tussock.navigation.studies.protocols.intervals import intervals
 from tussock.navigation.studies.thesis.heading_maps import heading_maps
 from tussock.navigation.studies.thesis.study_data import StudyData
 from tussock.navigation.sweeps.figures import along_axis
@@ -75,6 +76,9 @@ def test_figures_of_protocols_have_every_model(models):
     shown = {text.get_text() for text in drawn_texts(lines)}
     assert set(MODELS[:models]) <= shown
     check_figure(boxes_by_model(walks, "errors", "errors per walk"))
+    means = means_by_model(intervals(walks, {"errors": "number of errors"}), "number of errors", "errors per walk")
+    check_figure(means)
+    assert set(MODELS[:models]) <= {text.get_text() for text in drawn_texts(means)}
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ def test_ardin_by_hand():
     assert list(table.columns) == ["5 cm", "25 cm", "all"]
     assert table.loc["perfect-memory"].tolist() == [0.5, 1.5, 1.0]
     assert table.loc["random"].tolist() == [21, 27, 24]
-    assert results.tables["by_route"].set_index("model").loc["infomax"].tolist() == [4, 5, 4.5]
+    assert results.tables["by_route"].set_index("place")["infomax"].tolist() == [4, 5]
     *_, body_close = check_claims(ARDIN2016.claims, [results])
     assert body_close.obtained == [{"share of the way from perfect memory to random": pytest.approx(0.5 / 23)}]
     assert holds(ARDIN2016, results) == {"random-worst": True, "perfect-best": True, "body-close": True}
@@ -223,6 +223,13 @@ def test_kagioulis_by_hand():
     assert table["trial-fail count"].tolist() == [2, 1.5]
     assert holds(KAGIOULIS2024, results) == {"sequence-lowers-error": False, "sequence-fails-less": True}
     assert results.tables["by_route"].set_index("place").loc["b", "failures, chain"] == 2
+
+
+@pytest.mark.parametrize(("failures", "held"), [([2, 1, 3, 1, 2, 1], True), ([1, 0, 0, 0, 0, 0], False)])
+def test_a_sequence_helps_only_where_its_interval_says_so(failures, held):
+    models = ["perfect-memory"] * 6 + ["chain"] * 6
+    table = walks(model=models, resets=failures + [0] * 6, mean_error_deg=[5.0] * 12, place=list("abcdef") * 2)
+    assert holds(KAGIOULIS2024, KAGIOULIS2024.measure(table))["sequence-fails-less"] is held
 
 
 def test_azevedos_displacement_of_a_walk_by_hand():
@@ -582,6 +589,9 @@ def test_ardin_as_published_by_hand():
     assert results.numbers[share] == 4 / 20
     assert np.isnan(results.numbers[f"{share}, low"])
     assert holds(protocol, results) == {"random-worst": True, "perfect-best": True, "body-close": False}
+    untested = check_claims(protocol.claims, [results], few_units=False)
+    assert [each.label for each in untested] == ["not tested"] * 3  # two routes are too few
+    assert [each.known_effects[0].value for each in untested] == [12 + 2, 5 - 1, 4 / 20]  # as the means say
     close = protocol.measure(published_walks(errors | {"spiking-mushroom-body": [1, 2]}))
     assert holds(protocol, close)["body-close"] is True
     worst = protocol.measure(published_walks(errors | {"infomax": [30, 40]}))

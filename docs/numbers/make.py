@@ -4,6 +4,7 @@
     python docs/numbers/make.py --slow       all others
     python docs/numbers/make.py NAME ...     these
     python docs/numbers/make.py --pages      none; only write the pages again
+    python docs/numbers/make.py --keep DIR NAME ...   work in this folder: runs that are finished there are not done again
 
 Each is recorded in records/NAME.json: its values, and the command, commit, processor and day that they come from. The pages have marks,
 
@@ -44,24 +45,25 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(MEASUREMENTS))
     parser.add_argument("--slow", action="store_true", help="those that take minutes, not the quick ones")
     parser.add_argument("--pages", action="store_true", help="measure nothing")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="a folder to work in, instead of one that is removed")
     options = parser.parse_args()
     if unknown := set(options.names) - MEASUREMENTS.keys():
         parser.error(f"unknown: {', '.join(sorted(unknown))}; known: {', '.join(MEASUREMENTS)}")
     quick_or_slow = [name for name, each in MEASUREMENTS.items() if each.slow == options.slow]
     for name in [] if options.pages else options.names or quick_or_slow:
         try:
-            record(name, MEASUREMENTS[name])
+            record(name, MEASUREMENTS[name], options.keep)
         except NeedsSussex as reason:
             print(f"{name}: left as it is; {reason}", file=sys.stderr)
     write_pages()
 
 
-def record(name: str, measurement: Measurement) -> None:
-    """Measure, and write the record."""
+def record(name: str, measurement: Measurement, keep: Path | None = None) -> None:
+    """Measure, and write the record. keep: a folder with runs that were finished earlier, and count as their own seconds say."""
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        values = measurement.measure(Path(folder))
-    seconds = time.monotonic() - began
+        values = measurement.measure(Path(keep or folder))
+    seconds = values.pop("seconds", time.monotonic() - began)
     origin = {
         "command": measurement.command,
         "commit": commit(),
@@ -86,10 +88,11 @@ def written(page: str, kept: Mapping[str, Record]) -> str:
         return begin + MEASUREMENTS[name].texts[part](kept[name]["values"]) + end
 
     def origin(mark: re.Match[str]) -> str:
-        lines = ["| numbers | command | commit | processor | day |", "|---|---|---|---|---|"]
+        lines = ["| numbers | command | commit | processor | day | seconds |", "|---|---|---|---|---|---|"]
         for name in sorted({number[2] for number in NUMBER.finditer(page)}):
             made = kept[name]["origin"]
-            lines.append(f"| {name} | {made['command']} | {made['commit']} | {made['processor']} | {made['day']} |")
+            cells = (name, *(str(made[part]) for part in ("command", "commit", "processor", "day", "seconds")))
+            lines.append(f"| {' | '.join(cells)} |")
         return mark[1] + "\n".join(lines) + "\n" + mark[3]
 
     return ORIGIN.sub(origin, NUMBER.sub(number, page))

@@ -13,10 +13,11 @@ from tussock.world.routes import in_equal_steps
 from ...body import Body
 from ...experiment import Experiment
 from ...reports.claims import Decision, claim
-from ...reports.effects import bootstrap
+from ...reports.effects import Effect, bootstrap
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
+from .effects import over_routes
 from .figures import boxes_by_model, lines_by_model
 from .protocol import Item, Parameter, Protocol
 
@@ -123,7 +124,13 @@ def _random_worst(results: StudyResults) -> Decision:
     others = [_errors(results, model) for model in (PERFECT, BODY, INFOMAX)]
     obtained = {label: value for each in (*others, random) for label, value in each.items()}
     worst = zip(*(each.values() for each in others), strict=True)
-    return Decision(obtained, all(max(some) < most for some, most in zip(worst, random.values(), strict=True)))
+    effect = over_routes(
+        "random's errors minus those of the worst other",
+        results.tables["walks"],
+        "errors",
+        lambda mean: mean[RANDOM] - mean.drop(RANDOM).max(),
+    )
+    return Decision(obtained, all(max(some) < most for some, most in zip(worst, random.values(), strict=True)), effect)
 
 
 @claim(
@@ -135,7 +142,15 @@ def _perfect_best(results: StudyResults) -> Decision:
     others = [_errors(results, model) for model in (BODY, INFOMAX, RANDOM)]
     obtained = {label: value for each in (perfect, *others) for label, value in each.items()}
     best = zip(*(each.values() for each in others), strict=True)
-    return Decision(obtained, all(least <= min(some) for some, least in zip(best, perfect.values(), strict=True)))
+    effect = over_routes(
+        "errors of the best other minus perfect memory's",
+        results.tables["walks"],
+        "errors",
+        lambda mean: mean.drop(PERFECT).min() - mean[PERFECT],
+    )
+    return Decision(
+        obtained, all(least <= min(some) for some, least in zip(best, perfect.values(), strict=True)), effect
+    )
 
 
 @claim(
@@ -149,10 +164,16 @@ def _body_close(results: StudyResults) -> Decision:
     obtained = {
         name: value for name, value in results.numbers.items() if name.startswith(SHARE) and not math.isnan(value)
     }
-    shares = [
-        results.numbers[f"{SHARE}, {name}"] for name in PUT_BACK.values() if f"{SHARE}, {name}" in results.numbers
-    ]
-    return Decision(obtained, None if any(map(math.isnan, shares)) else max(shares) <= 0.1)
+    shares = {
+        name: results.numbers[f"{SHARE}, {name}"] for name in PUT_BACK.values() if f"{SHARE}, {name}" in results.numbers
+    }
+    if any(map(math.isnan, shares.values())):
+        return Decision(obtained, None)
+    worst = max(shares, key=lambda name: shares[name])
+    low, high = (results.numbers[f"{SHARE}, {worst}, {end}"] for end in ("low", "high"))
+    routes = results.tables["walks"]["place"].nunique()
+    effect = Effect(label=f"{SHARE}, {worst}", value=shares[worst], low=low, high=high, units=routes, of="routes")
+    return Decision(obtained, shares[worst] <= 0.1, effect)
 
 
 CLAIMS = (_random_worst, _perfect_best, _body_close)

@@ -20,6 +20,7 @@ from ...reports.drawing import (
 from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
+MAX_TICKS = 8  # at the values themselves
 MARKERS = "osD^vPX"  # seven, so that 35 models look different in five colours
 
 
@@ -49,6 +50,8 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
         ends = np.array([0.0, walks[x].max()])
         axis.plot(ends, ends, ":", color=SOFT_COLOUR, lw=1.2, label="as at the start")
     axis.set(xlabel=xlabel, ylabel=ylabel)
+    if len(values := walks[x].dropna().unique()) <= MAX_TICKS:
+        axis.set_xticks(np.sort(values))
     from_zero(axis)
     axis.grid(axis="y", color="#00000018")
     legend_above(axis)
@@ -78,7 +81,25 @@ def boxes_by_model(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
     return figure
 
 
-def boxes(name: str, title: str, y: str, ylabel: str, *, of: str = "walks") -> Item:
-    """The figure that `boxes_by_model` draws of a column of the table of walks. of: What there is one of in each row."""
-    caption = f"Median, quartiles, lowest and highest of all {of}."
+def means_by_model(intervals: pd.DataFrame, measure: str, label: str) -> Figure:
+    """Means with their intervals, one line per model; where most values are equal, as counts of rare events, boxes would show nothing.
+
+    Args:
+        intervals: A table of `intervals`.
+        measure: One of its measures.
+        label: Of the axis.
+    """
+    table = intervals[intervals["measure"] == measure].astype({"mean": float, "low": float, "high": float})
+    figure, axes = canvas((7.2, 0.8 + 0.34 * len(table)))
+    axis, places = axes[0, 0], np.arange(len(table))[::-1]
+    ends = [table["mean"] - table["low"], table["high"] - table["mean"]]
+    axis.barh(places, table["mean"], height=0.6, xerr=ends, color=ROUTE_COLOUR + "55", error_kw={"capsize": 2})
+    axis.set(yticks=places, yticklabels=table["model"], xlabel=label, ylim=(-0.55, len(table) - 0.45))
+    axis.grid(axis="x", color="#00000018")
+    return figure
+
+
+def boxes(name: str, title: str, y: str, ylabel: str) -> Item:
+    """The figure that `boxes_by_model` draws of a column of the table of walks."""
+    caption = "Median, quartiles, lowest and highest of all walks."
     return Item(name, title, "walks", caption, lambda walks: boxes_by_model(walks, y, ylabel))

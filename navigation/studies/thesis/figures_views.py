@@ -92,7 +92,8 @@ def _ambiguous(results: StudyResults, data: StudyData) -> Figure:
         draw_over_circle(axis, curve["degrees_off"], curve["rms"])
         row = curve.iloc[0]
         position = f"({row['x_m']:.1f}, {row['y_m']:.1f}) m"
-        axis.set_title(f"{position}: {row['minima']:.0f} minima, {row['error_deg']:.0f}° off")
+        minima = "1 minimum" if row["minima"] == 1 else f"{row['minima']:.0f} minima"
+        axis.set_title(f"{position}: {minima}, {row['error_deg']:.0f}° off")
     axes[0, 0].set_ylabel("RMS difference")
     return drawn
 
