@@ -55,6 +55,14 @@ def test_importing_tussock_loads_nothing_heavy():
     assert done.stdout == "set()\n"
 
 
+@pytest.mark.parametrize(("before", "after"), [({}, "passive"), ({"OMP_WAIT_POLICY": "active"}, "active")])
+def test_waiting_threads_of_torch_leave_the_cores_to_others(before, after):
+    code = "import os, tussock; print(os.environ['OMP_WAIT_POLICY'])"
+    environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"} | before
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == after
+
+
 @pytest.mark.parametrize(
     ("arguments", "unneeded"),
     [
@@ -110,6 +118,24 @@ def test_a_users_own_files_of_the_same_names_do_not_matter(folder):
     done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     command = [sys.executable, "-m", "tussock", "world", "--preset", "tiny", "--out", "w.glb"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_nor_do_files_of_the_current_folder_that_are_named_like_a_librarys(folder):
+    (folder / "coverage").mkdir()  # which numba looks for
+    axes = '[fixed]\nworld = "tiny"\nsize = "60x12"\nroute-length-m = 1\n[axes]\nmodel = ["random"]\n'
+    (folder / "sweep.toml").write_text(axes)
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "tussock",
+        "sweep",
+        "sweep.toml",
+        "--out",
+        "out",
+    ]  # -P: as the installed command
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 

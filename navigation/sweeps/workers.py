@@ -7,7 +7,8 @@ from multiprocessing import forkserver
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # how these processes begin
 WORK = "tussock.navigation.sweeps.work"  # what they import
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+# As Dask has it, each worker has one core. And no file of the current folder is taken for a library's, as `python -c` does.
+ENVIRONMENT = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PYTHONSAFEPATH"), "1")
 
 
 def prepare_workers() -> None:
@@ -19,10 +20,10 @@ def prepare_workers() -> None:
         return
     multiprocessing.get_context(METHOD).set_forkserver_preload([WORK])
     before = dict(os.environ)
-    os.environ.update(ONE_THREAD)  # as Dask has it: each worker has one core
+    os.environ.update(ENVIRONMENT)
     try:
         forkserver.ensure_running()
     finally:
-        for name in ONE_THREAD:
+        for name in ENVIRONMENT:
             os.environ.pop(name)
         os.environ.update(before)
