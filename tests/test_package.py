@@ -122,20 +122,24 @@ def test_a_users_own_files_of_the_same_names_do_not_matter(folder):
     assert done.returncode == 0, done.stderr
 
 
-def test_nor_do_files_of_the_current_folder_that_are_named_like_a_librarys(folder):
+SWEEP = """
+[fixed]
+world = "tiny"
+size = "60x12"
+route-length-m = 1
+[axes]
+model = ["random", "perfect-memory"]
+seed = { from = 0, to = 1 }
+"""
+
+
+def test_nor_do_those_of_the_same_names_as_a_library(folder):
     (folder / "coverage").mkdir()  # which numba looks for
-    axes = '[fixed]\nworld = "tiny"\nsize = "60x12"\nroute-length-m = 1\n[axes]\nmodel = ["random"]\n'
-    (folder / "sweep.toml").write_text(axes)
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "tussock",
-        "sweep",
-        "sweep.toml",
-        "--out",
-        "out",
-    ]  # -P: as the installed command
+    (folder / "bin").mkdir()
+    installed = folder / "bin" / "command.py"  # as the installed command: in another folder than the current one
+    installed.write_text("from tussock.navigation.cli.main import main\n\nif __name__ == '__main__':\n    main()\n")
+    (folder / "sweep.toml").write_text(SWEEP)
+    command = [sys.executable, installed, "sweep", "sweep.toml", "--out", "out"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
