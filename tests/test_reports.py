@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
 from tussock.navigation.reports.claims import Claim, Decision, Spread, check_claims, count_outcomes
 from tussock.navigation.reports.drawing import canvas
@@ -197,12 +198,13 @@ def test_few_units_are_no_test_where_one_is_asked_for(units, label):
 # Effects
 
 
-def test_the_interval_of_an_effect_is_that_of_the_textbook():
-    values = np.random.default_rng(1).normal(3, 2, 400)
-    effect = effect_size("mean", 400, lambda rows: float(values[rows].mean()), of="positions")
-    assert effect.value == values.mean()
-    half = 1.96 * values.std() / 20
-    assert np.allclose([effect.low, effect.high], [effect.value - half, effect.value + half], atol=0.1 * half)
+@pytest.mark.parametrize("units", [8, 15, 400])
+def test_the_interval_of_an_effect_is_that_of_the_textbook(units):
+    values = 3 + 2 * stats.norm.ppf((np.arange(units) + 0.5) / units)
+    effect = effect_size("mean", units, lambda rows: float(values[rows].mean()), of="positions")
+    assert effect.value == pytest.approx(3)
+    half = stats.t.ppf(0.975, units - 1) * stats.sem(values)
+    assert np.allclose([effect.low, effect.high], [effect.value - half, effect.value + half], atol=0.12 * half)
 
 
 def test_there_is_no_interval_of_few_or_equal_units():
@@ -215,7 +217,7 @@ def test_there_is_no_interval_of_few_or_equal_units():
 
 @pytest.mark.parametrize(
     ("units", "text"),
-    [(4, "mean: 1.5 (4 routes: no interval)"), (9, "mean: 4 (2.33 to 5.56; 9 routes)")],
+    [(4, "mean: 1.5 (4 routes: no interval)"), (9, "mean: 4 (1.69 to 5.98; 9 routes)")],
 )
 def test_effects_as_text(units, text):
     (result,) = check_claims([with_effect(units)], [StudyResults(tables={}, numbers={})])
