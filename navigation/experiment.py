@@ -251,7 +251,7 @@ class Experiment(Surroundings):
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
         with self.open_renderer(world) as renderer:
-            log.info(f"renderer: {renderer.backend}")
+            log.info(f"renderer: {renderer.backend}" + f", device: {self.device}" * (self.device != "cpu"))
             yield self.train(renderer, route, progress)
 
     def run(self, progress: Progress = no_progress) -> "Trajectory":
