@@ -8,12 +8,10 @@ import eyes
 import pictures
 import processors
 import protocols
-from measurement import ROOT, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
+from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
 from tussock.navigation.models import MODELS as REGISTRY
-
-RESULTS = ROOT / "docs" / "benchmark"  # of the test bed
 
 
 def measure_learning_walks(folder: Path) -> Values:
