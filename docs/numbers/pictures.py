@@ -137,4 +137,10 @@ MEASUREMENTS: dict[str, Measurement] = {
             "off": lambda values: str(values["causes"]["off the catchment"]),
         },
     ),
+    "figures": Measurement(
+        "`python docs/draw_models.py`",
+        measure_models,
+        {"turn": lambda values: f"{values['turn_deg']:.0f} degrees"},
+        slow=True,
+    ),
 }
