@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import eyes
 import pictures
 import protocols
 from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
@@ -54,7 +55,8 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
-    pictures.MEASUREMENTS
+    eyes.MEASUREMENTS
+    | pictures.MEASUREMENTS
     | protocols.MEASUREMENTS
     | {
         "learning-walks": Measurement(
