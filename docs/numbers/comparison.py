@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from measurement import ROOT, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
+from measurement import ROOT, Measurement, Values, sussex, tussock
 
 from tussock.navigation.models import MODELS as REGISTRY
 
@@ -55,12 +55,6 @@ def measure_sussex(folder: Path) -> Values:
     }
 
 
-def measure_generated(folder: Path) -> Values:
-    """Walks of each model in generated worlds."""
-    axes = {"model": MODELS, "seed": seeds(0, 9)}
-    return arrivals(sweep(folder, "walks", {"world": "tussock-field", "offset-m": 0.1}, axes), "model")
-
-
 def measure_oracle(folder: Path) -> Values:
     """The errors of models, and of oracles that have seen everything."""
     files = sussex("world5000_gray.bin", *(f"{route}.bin" for route in ROUTES))
@@ -94,11 +88,6 @@ def models_table(values: Values) -> str:
 
     head = ["model", "ant1: median, mean error (degrees)", "ant4", "arrived on ant1, ant4", "memory, MB"]
     return table(head, map(line, MODELS))
-
-
-def generated_table(values: Values) -> str:
-    """How many walks of each model arrived."""
-    return table(["model", "arrived"], ([f"`{model}`", of(values[model])] for model in MODELS))
 
 
 def oracle_table(values: Values) -> str:
@@ -136,9 +125,6 @@ MEASUREMENTS: dict[str, Measurement] = {
         measure_sussex,
         {"readme": readme_table, "models": models_table},
         slow=True,
-    ),
-    "generated": Measurement(
-        "a sweep of `model` and `seed`, with `offset-m = 0.1`", measure_generated, {"table": generated_table}, slow=True
     ),
     "oracle": Measurement(
         "`python benchmarks/heading_oracle.py ..`",

@@ -13,6 +13,7 @@ import pandas as pd
 
 ROOT = Path(__file__).parents[2]
 SUSSEX = ROOT.parent / "shared" / "sussex"  # the world and routes of the study; they are not part of the project
+RESULTS = ROOT / "docs" / "benchmark"  # of the test bed
 
 Values = dict[str, Any]
 

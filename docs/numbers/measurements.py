@@ -3,17 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import comparison
 import eyes
 import pictures
-import processors
 import protocols
-from measurement import ROOT, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
+from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
 from tussock.navigation.models import MODELS as REGISTRY
-
-RESULTS = ROOT / "docs" / "benchmark"  # of the test bed
 
 
 def measure_learning_walks(folder: Path) -> Values:
@@ -59,10 +55,8 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
-    comparison.MEASUREMENTS
-    | eyes.MEASUREMENTS
+    eyes.MEASUREMENTS
     | pictures.MEASUREMENTS
-    | processors.MEASUREMENTS
     | protocols.MEASUREMENTS
     | {
         "learning-walks": Measurement(

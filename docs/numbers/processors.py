@@ -1,11 +1,12 @@
 """How far another processor changes the test bed: the same runs with the libraries restricted to older instructions."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from measurement import Measurement, Values, of, tussock
+from measurement import RESULTS, Measurement, Values, of, tussock
 
 from tussock.navigation.benchmark.definition import BENCHMARK
 from tussock.navigation.benchmark.models import enter_named
@@ -21,18 +22,8 @@ SETTINGS = {
     "numba": {"NUMBA_CPU_NAME": "generic"},
 }
 LIBRARIES = {name: value for key, settings in SETTINGS.items() if key != "numba" for name, value in settings.items()}
-EXACT = {f"only {name}": settings for name, settings in SETTINGS.items()} | {
-    "all of them": LIBRARIES | SETTINGS["numba"]
-}
-LEARNED = {
-    "AVX2": {
-        "ATEN_CPU_CAPABILITY": "avx2",
-        "ONEDNN_MAX_CPU_ISA": "AVX2",
-        "MKL_ENABLE_INSTRUCTIONS": "AVX2",
-        "NUMBA_CPU_NAME": "haswell",
-    },
-    "SSE4": EXACT["all of them"],
-}
+OLDER = LIBRARIES | SETTINGS["numba"]
+RUN = ("world", "seed", "heading_noise_deg", "offset_m")  # what tells the runs of a model apart
 NETWORKS = ("mlp-mixture", "infomax", "mushroom-body")
 
 Walks = dict[tuple, tuple[str, str]]  # for each run how it ended, and its steps
@@ -42,7 +33,7 @@ def walks(bed: Path) -> Walks:
     """The runs in a folder of the test bed."""
     with Store(bed, read_only=True) as store:
         return {
-            tuple(row[name] for name in ("world", "seed", "heading_noise_deg", "offset_m")): (
+            tuple(row[name] for name in RUN): (
                 row["reason"],
                 store.steps(key),
             )
@@ -75,41 +66,52 @@ def compared(usual: Walks, other: Walks) -> Values:
 
 
 def measure_exact(folder: Path) -> Values:
-    """Perfect memory under every setting, and with two threads."""
+    """Perfect memory under every setting, and with two threads, against its usual steps."""
     model = "perfect-memory"
     usual = under(folder, model, "usual", {})
-    values = {name: compared(usual, under(folder, model, name, each)) for name, each in EXACT.items()}
-    return {
-        model: {
-            "usual": compared(usual, usual),
-            **values,
-            "2 threads": compared(usual, with_two_threads(folder, model)),
-        }
-    }
+    settings = {f"only {name}": each for name, each in SETTINGS.items()} | {"all of them": OLDER}
+    values = {name: compared(usual, under(folder, model, name, each)) for name, each in settings.items()}
+    return values | {"two threads": compared(usual, with_two_threads(folder, model))}
 
 
 def measure_learned(folder: Path) -> Values:
-    """Learned networks under the settings that change the most."""
+    """Learned networks under all settings together, against the results of the leaderboard."""
     values = {}
     for model in NETWORKS:
-        usual = under(folder, model, "usual", {})
-        others = {name: compared(usual, under(folder, model, name, each)) for name, each in LEARNED.items()}
-        values[model] = {"usual": compared(usual, usual), **others}
+        under(folder, model, "older", OLDER)
+        usual, other = (results(path / f"{model}.json") for path in (RESULTS, folder / f"{model} older" / "results"))
+        values[model] = {"usually": compared(usual, usual)["arrived"], **compared(usual, other)}
     return values
 
 
-def table(values: Values) -> str:
-    """One line for each model and setting."""
-    lines = ["", "| entry | setting | arrived | other steps | end otherwise |", "|---|---|---|---|---|"]
-    for model, settings in values.items():
-        for setting, each in settings.items():
-            differing = f"{each['other steps']} | {each['end otherwise']}" if setting != "usual" else "|"
-            lines.append(f"| `{model}` | {setting} | {of(each['arrived'])} | {differing} |")
-    return "\n".join(lines) + "\n"
+def results(path: Path) -> Walks:
+    """The runs of a result."""
+    runs = json.loads(path.read_text())["runs"]
+    measured = ("steps", "mean_deviation_m", "max_deviation_m", "poor_steps")
+    return {
+        tuple(run[name] for name in RUN): (run["reason"], json.dumps([run[name] for name in measured])) for run in runs
+    }
+
+
+def exact_table(values: Values) -> str:
+    """One line for each setting."""
+    head = ["", "| `perfect-memory` with | arrived | other steps |", "|---|---|---|"]
+    lines = [f"| {setting} | {of(each['arrived'])} | {each['other steps']} |" for setting, each in values.items()]
+    return "\n".join(head + lines) + "\n"
+
+
+def learned_table(values: Values) -> str:
+    """One line for each model."""
+    head = ["", "| entry | arrived | arrived, all older | other steps | end otherwise |", "|---|---|---|---|---|"]
+    lines = [
+        f"| `{model}` | {of(each['usually'])} | {of(each['arrived'])} | {each['other steps']} | {each['end otherwise']} |"
+        for model, each in values.items()
+    ]
+    return "\n".join(head + lines) + "\n"
 
 
 COMMAND = "`tussock benchmark --model NAME`, with variables of the environment"
 MEASUREMENTS: dict[str, Measurement] = {
-    "processors-exact": Measurement(COMMAND, measure_exact, {"table": table}, slow=True),
-    "processors-learned": Measurement(COMMAND, measure_learned, {"table": table}, slow=True),
+    "processors-exact": Measurement(COMMAND, measure_exact, {"table": exact_table}, slow=True),
+    "processors-learned": Measurement(COMMAND, measure_learned, {"table": learned_table}, slow=True),
 }
