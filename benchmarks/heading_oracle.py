@@ -10,6 +10,7 @@ No view is at a tested position itself.
 """
 
 import argparse
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -76,11 +77,12 @@ def known_position(
     return HeadingErrors(**{name: np.concatenate([vars(one)[name] for one in each]) for name in vars(each[0])})
 
 
-def table(errors: HeadingErrors) -> dict[str, str]:
+def table(errors: HeadingErrors) -> dict[str, dict[str, float]]:
     """Number of positions, and median and mean error (degrees), by distance from the route."""
     bands = errors.by_distance() | {"all": errors}
     return {
-        name: f"{band.median_error_deg:.1f}, {band.mean_error_deg:.1f} ({len(band)})" for name, band in bands.items()
+        name: {"n": len(band), "median_error_deg": band.median_error_deg, "mean_error_deg": band.mean_error_deg}
+        for name, band in bands.items()
     }
 
 
@@ -92,19 +94,31 @@ def main() -> None:
     parser.add_argument("--grid-m", type=float, default=0.2)
     parser.add_argument("--within-m", type=float, default=0.2)
     parser.add_argument("--dense-m", type=float, default=0.02)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     together: dict[str, list[tuple[HeadingErrors, np.ndarray]]] = {}
     for route in options.routes:
         for name, errors, room in errors_on(route, options.world, options):
             together.setdefault(name, []).append((errors, room))
-    for title, least in (("all positions", 0.0), (f"with {100 * ROOM:g} cm of room", ROOM)):
-        rows = {}
-        for name, parts in together.items():
-            parts = [errors.among(room >= least) for errors, room in parts]
-            joined = {field: np.concatenate([vars(part)[field] for part in parts]) for field in vars(parts[0])}
-            rows[name] = table(HeadingErrors(**joined))
+    tables = {
+        "all positions": {name: table(joined(parts, 0.0)) for name, parts in together.items()},
+        f"with {100 * ROOM:g} cm of room": {name: table(joined(parts, ROOM)) for name, parts in together.items()},
+    }
+    if options.json:
+        print(json.dumps(tables))
+        return
+    for title, rows in tables.items():
         print(f"{title}: median, mean (degrees), in parentheses the number of positions")
-        print(pd.DataFrame(rows).T.to_string(), end="\n\n")
+        print(
+            pd.DataFrame(rows).T.map("{median_error_deg:.1f}, {mean_error_deg:.1f} ({n})".format_map).to_string(),
+            end="\n\n",
+        )
+
+
+def joined(parts: list[tuple[HeadingErrors, np.ndarray]], least: float) -> HeadingErrors:
+    """The errors of all routes at positions with at least this clearance (m)."""
+    kept = [errors.among(room >= least) for errors, room in parts]
+    return HeadingErrors(**{field: np.concatenate([vars(part)[field] for part in kept]) for field in vars(kept[0])})
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """Draws the pictures of docs/models.md: the familiarity of every heading for each model, on a straight and at a corner.
 
-    python docs/draw_models.py [NAME ...]
+    python docs/draw_models.py [NAME ...] [--out FOLDER]
 
-writes assets/models/NAME.png; without names, for all models.
+writes FOLDER/NAME.png; without names for all models, without a folder into assets/models.
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import matplotlib
@@ -32,9 +32,14 @@ FACING = np.radians(40)  # to the left of the route's heading, so that the answe
 def straight_and_corner(route: Route) -> tuple[float, float]:
     """Where along the route (m) its heading changes the least, and the most, over STRETCH."""
     along = np.arange(FROM_ENDS, route.length - FROM_ENDS, 0.05)
-    before, after = (route.at(along + side * STRETCH / 2)[:, 2] for side in (-1, 1))
-    change = np.abs(wrap_angle(after - before))
+    change = np.abs(change_of_heading(route, along))
     return float(along[change.argmin()]), float(along[change.argmax()])
+
+
+def change_of_heading(route: Route, along: np.ndarray | float) -> np.ndarray:
+    """By how much the route turns (rad) over STRETCH, about each position along it (m)."""
+    before, after = (route.at(along + side * STRETCH / 2)[:, 2] for side in (-1, 1))
+    return wrap_angle(after - before)
 
 
 def draw(path: Path, scans: list[tuple[str, np.ndarray, float]], title: str) -> None:
@@ -76,21 +81,29 @@ def draw_familiarity(axes: Axes, familiarity: np.ndarray, facing: float) -> None
     axes.margins(y=0.2)
 
 
-def main(names: list[str]) -> None:
+def main() -> None:
+    """Draw the pictures, and print by how many degrees the route turns at the corner."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", default=[*MODELS.builtin, "opponent-infomax"], metavar="NAME")
+    parser.add_argument("--out", type=Path, default=PICTURES, help="folder for the pictures")
+    options = parser.parse_args()
     world = World.generate("tussock-field", seed=7)
     route = generate_route(world, seed=7)
     encoding = Encoding.named("edges", resize=6)
-    eyes = [Pose(*route.at(along)[0]).moved(0, ASIDE).turned(FACING) for along in straight_and_corner(route)]
-    PICTURES.mkdir(exist_ok=True)
+    places = straight_and_corner(route)
+    eyes = [Pose(*route.at(along)[0]).moved(0, ASIDE).turned(FACING) for along in places]
+    options.out.mkdir(exist_ok=True)
     with open_renderer(world) as renderer:
         seen = encoding(renderer.render(eyes))
-        for name in names:
+        for name in options.names:
             model = train(make_model(name), encoding, renderer, training_poses(route, 0.04)).model
             straight, corner = model.scan(seen).numpy()
             positions = [("on a straight", straight, FACING), ("at a corner", corner, FACING)]
-            draw(PICTURES / f"{name}.png", positions, title=name)
-            print(PICTURES / f"{name}.png")
+            draw(options.out / f"{name}.png", positions, title=name)
+            print(options.out / f"{name}.png")
+    turn = np.degrees(np.abs(change_of_heading(route, places[1]))).item()
+    print(f"degrees by which the corner turns: {turn:.1f}")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [*MODELS.builtin, "opponent-infomax"])
+    main()

@@ -4,8 +4,8 @@ import os
 import subprocess
 import sys
 
-import numpy as np
 import pytest
+from processors import LIBRARIES, SETTINGS
 
 # The first walks of the test bed, and a digest of their poses.
 WALKS = """
@@ -19,15 +19,6 @@ for run in QUICK.sweep(model).experiments[: int(count)]:
     poses.update(repr([walk.column(name) for name in ("x_m", "y_m", "heading_deg")]).encode())
 print(poses.hexdigest())
 """
-SETTINGS = {
-    "torch": {"ATEN_CPU_CAPABILITY": "default"},
-    "onednn": {"ONEDNN_MAX_CPU_ISA": "SSE41"},
-    "mkl": {"MKL_ENABLE_INSTRUCTIONS": "SSE4_2"},
-    "numpy": {"NPY_DISABLE_CPU_FEATURES": " ".join(np._core._multiarray_umath.__cpu_dispatch__)},  # type: ignore[attr-defined]
-    "opencv": {"OPENCV_CPU_DISABLE": "SSE4.1,SSE4.2,AVX,FP16,AVX2,FMA3,AVX_512F,AVX512_SKX"},
-    "numba": {"NUMBA_CPU_NAME": "generic"},
-}
-LIBRARIES = {name: value for key, settings in SETTINGS.items() if key != "numba" for name, value in settings.items()}
 
 
 def digest(model: str, count: int, threads: int = 1, **settings: str) -> str:

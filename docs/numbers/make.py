@@ -11,7 +11,7 @@ Each is recorded in records/NAME.json: its values, and the command, commit, proc
     <!-- number: NAME.PART -->1.1 cm<!-- end of number -->
 
 between which the record's text stands. Between `<!-- numbers: origin -->` and `<!-- end of numbers -->` stands where the numbers of
-a page come from.
+a page come from. Pictures are drawn into assets; their records have a digest of each.
 """
 
 import argparse

@@ -1,6 +1,7 @@
 """A measurement: something that is run for the numbers that README and docs print; and what measurements run."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +13,7 @@ import pandas as pd
 
 ROOT = Path(__file__).parents[2]
 SUSSEX = ROOT.parent / "shared" / "sussex"  # the world and routes of the study; they are not part of the project
+RESULTS = ROOT / "docs" / "benchmark"  # of the test bed
 
 Values = dict[str, Any]
 
@@ -37,10 +39,10 @@ class Measurement:
     slow: bool = False
 
 
-def tussock(folder: Path, *arguments: object) -> Values:
-    """What a command of tussock reports."""
+def tussock(folder: Path, *arguments: object, environment: Mapping[str, str] | None = None) -> Values:
+    """What a command of tussock reports, with further variables of the environment."""
     command = [sys.executable, "-m", "tussock", *map(str, arguments), "--json"]
-    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True, env=os.environ | (environment or {}))
     if done.returncode != 0:
         raise SystemExit(f"failed: {' '.join(command)}")
     return json.loads(done.stdout)

@@ -3,19 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pictures
 import protocols
-from measurement import ROOT, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
+from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
 from tussock.navigation.models import MODELS as REGISTRY
-
-RESULTS = ROOT / "docs" / "benchmark"  # of the test bed
-
-
-def measure_walk(folder: Path) -> Values:
-    """The walk of README's picture."""
-    summary = tussock(folder, "run", "--seed", 9, "--offset-m", 0.1, "--out", "run")
-    return {name: summary[name] for name in ("steps", "mean_deviation_m", "reason")}
 
 
 def measure_learning_walks(folder: Path) -> Values:
@@ -60,32 +53,31 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
 
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
-MEASUREMENTS = protocols.MEASUREMENTS | {
-    "walk": Measurement(
-        "`tussock run --seed 9 --offset-m 0.1`",
-        measure_walk,
-        {
-            "deviation": lambda values: f"{100 * values['mean_deviation_m']:.1f} cm",
-            "steps": lambda values: str(values["steps"]),
-        },
-    ),
-    "learning-walks": Measurement(
-        "a sweep of `learning-walk-m`, `offset-m`, `heading-noise-deg` and `seed`",
-        measure_learning_walks,
-        with_and_without("0") | with_and_without("10"),
-        slow=True,
-    ),
-    "learning-walks-sussex": Measurement(
-        "a sweep of `route`, `learning-walk-m`, `offset-m` and `heading-noise-deg`",
-        measure_learning_walks_sussex,
-        with_and_without("0") | with_and_without("10"),
-        slow=True,
-    ),
-    "test-bed": Measurement(
-        "`tussock benchmark --model NAME`",
-        measure_test_bed,
-        {model: lambda values, model=model: f"{values['arrived'][model]:.0%}".replace("%", " %") for model in MODELS}
-        | {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
-        slow=True,
-    ),
-}
+MEASUREMENTS = (
+    pictures.MEASUREMENTS
+    | protocols.MEASUREMENTS
+    | {
+        "learning-walks": Measurement(
+            "a sweep of `learning-walk-m`, `offset-m`, `heading-noise-deg` and `seed`",
+            measure_learning_walks,
+            with_and_without("0") | with_and_without("10"),
+            slow=True,
+        ),
+        "learning-walks-sussex": Measurement(
+            "a sweep of `route`, `learning-walk-m`, `offset-m` and `heading-noise-deg`",
+            measure_learning_walks_sussex,
+            with_and_without("0") | with_and_without("10"),
+            slow=True,
+        ),
+        "test-bed": Measurement(
+            "`tussock benchmark --model NAME`",
+            measure_test_bed,
+            {
+                model: lambda values, model=model: f"{values['arrived'][model]:.0%}".replace("%", " %")
+                for model in MODELS
+            }
+            | {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
+            slow=True,
+        ),
+    }
+)
