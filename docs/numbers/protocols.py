@@ -253,6 +253,14 @@ def in_a_line(values: Values) -> str:
 SUSSEX_WORLD = "--world S/world5000_gray.bin --route S"
 FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables that are kept, texts
     "ardin2016": ("ardin2016", ["by_displacement"], {"errors": errors_by_start}),
+    "ardin2016-sussex": (
+        "ardin2016 --world S/world5000_gray.bin --route S/ant1_route1.bin,S/ant4_route1.bin --cull-back-faces",
+        ["by_displacement"],
+        {
+            "errors": errors_by_start,
+            "share": lambda values: number(values["claims"]["body-close"]["effects"][0]["value"]),
+        },
+    ),
     "kagioulis2024": ("kagioulis2024", ["intervals"], {"means": means}),
     "kagioulis2024-as-published": ("kagioulis2024 --as-published", ["intervals"], {"means": means}),
 }

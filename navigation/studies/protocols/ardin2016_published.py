@@ -222,7 +222,7 @@ DIFFERENCES = (
     "circuit at rest; there, tags and dopamine of one learned view reach into the next, 80 ms later.",
     "An agent that walks 3 m without progress along the route, or leaves the world, is put back as well, and that is an error.",
     "A start at 25 cm is put back at once, which is one error of every model.",
-    "Unknown, and chosen by us: perfect memory compares by the RMS difference; the learning rate of Infomax is that for views in 0..1.",
+    "Unknown, and chosen by us: perfect memory compares by the RMS difference; the learning rate of Infomax.",
     "The control draws a random heading for each different view; it draws the same one where it meets the same view again.",
 )
 
@@ -283,7 +283,7 @@ ARDIN2016_AS_PUBLISHED = Protocol(
         stopping=_rules("next-waypoint"),
     ),
     axes={
-        "model": (PERFECT, BODY, f"{INFOMAX} rate=unit-range", RANDOM),
+        "model": (PERFECT, BODY, f"{INFOMAX} rate={20 / 360**2:.3g}", RANDOM),  # docs/protocols.md: how it was chosen
         "stopping": (_rules("next-waypoint"), _rules("nearest-point")),
         "start_offset": (0.0, *(side * each for each in (0.05, 0.10, 0.15, 0.20, 0.25) for side in (1, -1))),
     },
