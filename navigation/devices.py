@@ -4,7 +4,7 @@ from tussock.world.errors import SettingError, first_line
 
 
 def chosen_device(device: str) -> str:
-    """The name of a device: for "auto", "cuda" where torch has a GPU, which is faster for all models (docs/performance.md), else "cpu"."""
+    """The name of a device: for "auto", "cuda" where torch has a GPU, on which all models learn at least as fast (docs/performance.md), else "cpu"."""
     if device != "auto":
         return device
     import torch
@@ -19,4 +19,4 @@ def check_device(device: str) -> None:
     try:
         torch.zeros(1, device=device).item()
     except (RuntimeError, AssertionError, TypeError) as error:
-        raise SettingError(f"device {device!r} cannot be used here ({first_line(error)}); give cpu, or auto") from error
+        raise SettingError(f"device {device!r} cannot be used here ({first_line(error)}); give cpu") from error

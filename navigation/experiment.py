@@ -251,7 +251,11 @@ class Experiment(Surroundings):
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
         with self.open_renderer(world) as renderer:
-            log.info(f"renderer: {renderer.backend}" + f", device: {self.device}" * (self.device != "cpu"))
+            log.info(
+                f"renderer: {renderer.backend}"
+                if self.device == "cpu"
+                else f"renderer: {renderer.backend}, device: {self.device}"
+            )
             yield self.train(renderer, route, progress)
 
     def run(self, progress: Progress = no_progress) -> "Trajectory":

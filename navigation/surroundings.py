@@ -103,7 +103,7 @@ class Surroundings:
             they see those of the route.
         eye: What part of the sphere is seen, and how finely. Default: that of the databases, or `Eye()`.
         seed: Of everything random: world and route where they are generated, and, in an experiment, the model's start and the noise.
-        renderer: "auto", "cpu", "egl" or "osmesa".
+        renderer: "auto", "cpu", "cuda", "egl" or "osmesa".
         threads: To draw with, and, in an experiment, to learn and compare with; None means one for each core.
     """
 

@@ -13,7 +13,7 @@ from numba.core import config as numba_config
 from numba.core import event
 
 log = logging.getLogger(__name__)
-config: Any = numba_config  # its names are made when it is imported
+config: Any = numba_config  # its attributes are set at import
 SIMULATED = bool(config.ENABLE_CUDASIM)  # whether numba simulates a GPU, which is for tests
 
 

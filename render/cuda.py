@@ -1,9 +1,12 @@
 """The CUDA renderer: the panoramas of the CPU renderer (scanline.py), on a GPU of NVIDIA.
 
-Both use the same functions, so that a view is the same, but for the rounding of the GPU (it rounds a product and a sum at once): this could
-be seen where a ray meets an edge, or where two surfaces are equally near.
+Both use the same functions, so that a view is the same but for rounding: the GPU rounds a product and a sum at once. So a ray that meets an
+edge exactly may pass between two triangles there, of two surfaces that are equally near the other one may be seen, and a channel of a
+texture may be 1 off. In tests and in thousands of views of generated worlds no byte differed.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from threading import Lock
 from typing import Any
@@ -11,7 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tussock.world.errors import InputError, MissingDependencyError, first_line
+from tussock.world.errors import InputError, MissingDependencyError
 from tussock.world.scene import World
 
 from .compile import SIMULATED, config
@@ -20,8 +23,10 @@ from .poses import Poses, Views, poses_of_eye
 from .scanline_kernels import find_directions
 from .scene_arrays import Scene
 
-RAYS, VIEWS = 2**26, 2**15  # drawn at once, at most; a ray takes 8 bytes of the GPU's memory
-WIDE = 2**20  # triangles of many columns in a batch that blocks of threads draw; further ones have a thread each
+RAYS, VIEWS = 2**26, 2**15  # drawn at once, at most; a ray takes 8 bytes of the GPU's memory, and a column 16
+WIDE = (
+    2**20
+)  # triangles of many columns in a batch that blocks of threads draw; more than these are drawn by one thread each
 BLOCKS = 4096  # of threads that draw wide triangles
 
 
@@ -34,6 +39,7 @@ class CudaRenderer:
 
     Raises:
         MissingDependencyError: There is no such GPU, or no numba-cuda.
+        InputError: Its memory is too small.
     """
 
     backend = "cuda"
@@ -49,27 +55,31 @@ class CudaRenderer:
         triangles, rays, lookup = scene.triangles, scene.rays, scene.lookup or ()
         size = len(rays.azimuths), len(rays.tangents)
         self._azimuths, self._numbers = rays.azimuths, (rays.top, rays.rows_per_rad, *size)
-        self._triangles: Any = cuda.to_device(triangles.corners), cuda.to_device(triangles.labels), triangles.cull
-        self._tangents, self._lookup = cuda.to_device(rays.tangents), tuple(map(cuda.to_device, lookup))
-        self._paint: Any = rays.per_pixel, *map(cuda.to_device, scene.paint)
+        with _enough_memory():
+            self._triangles: Any = cuda.to_device(triangles.corners), cuda.to_device(triangles.labels), triangles.cull
+            self._tangents, self._lookup = cuda.to_device(rays.tangents), tuple(map(cuda.to_device, lookup))
+            self._paint: Any = rays.per_pixel, *map(cuda.to_device, scene.paint)
         self._batch = min(max(1, RAYS // (size[0] * size[1])), VIEWS)
         self._memory: Any = None  # of a batch on the GPU: keys, pixels, and wide triangles
-        self._open = True
 
     def __reduce__(self):
         """In another process it is opened anew."""
         return CudaRenderer, (self.world, self.eye)
 
     def render(self, poses: Poses) -> Views:
-        """See `Renderer.render`. Threads take turns."""
-        if not self._open:
-            raise InputError("this renderer is closed; open another one")
+        """See `Renderer.render`. Threads take turns.
+
+        Raises:
+            InputError: Also where the memory of the GPU is too small.
+        """
         eyes = poses_of_eye(self.world, self.eye, poses)
         views = np.empty((len(eyes), self.eye.height, self.eye.width, 4), dtype=np.uint8)
-        with self._lock:
+        with self._lock, _enough_memory():
+            if self._triangles is None:
+                raise InputError("this renderer is closed; open another one")
             for begin in range(0, len(eyes), self._batch):
-                some = slice(begin, begin + self._batch)
-                self._draw(eyes[some], views[some])
+                batch = slice(begin, begin + self._batch)
+                self._draw(eyes[batch], views[batch])
         return views
 
     def _draw(self, eyes: Float[np.ndarray, "n 4"], views: Views) -> None:
@@ -77,8 +87,8 @@ class CudaRenderer:
         cuda, threads, (clear, narrow, wide, average) = self._cuda, self._threads, self._kernels
         n, (*_, columns, rows) = len(eyes), self._numbers
         directions = np.empty((n, 2, columns))
-        for eye, those in zip(eyes, directions, strict=True):
-            find_directions(self._azimuths, eye[2], those)
+        for heading, of_view in zip(eyes[:, 2], directions, strict=True):
+            find_directions(self._azimuths, heading, of_view)
         if self._memory is None or len(self._memory[0]) < n:
             self._memory = None  # the former memory is free before more is taken
             pixels = cuda.device_array((n, self.eye.height, self.eye.width), np.uint32)
@@ -97,8 +107,8 @@ class CudaRenderer:
 
     def close(self) -> None:
         """Free the memory on the GPU."""
-        self._open = False
-        self._triangles = self._tangents = self._lookup = self._paint = self._memory = None
+        with self._lock:
+            self._triangles = self._tangents = self._lookup = self._paint = self._memory = None
 
     def __enter__(self) -> "CudaRenderer":
         return self
@@ -117,13 +127,21 @@ def _cuda() -> Any:
 
     config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # they advise to start larger jobs, and one view is a small one
     if not cuda.is_available():
-        try:
-            cuda.detect()
-        except Exception as error:
-            reason = first_line(error)
-        else:
-            reason = "no device was found"
+        reason = " ".join(str(cuda.cuda_error() or "its compiler NVVM is missing: pip install 'tussock[cuda]'").split())
         raise MissingDependencyError(
             f"the cuda renderer needs a GPU of NVIDIA and its driver ({reason}); use the cpu renderer"
         )
     return cuda
+
+
+@contextmanager
+def _enough_memory() -> Iterator[None]:
+    """Within the block, too little memory of the GPU is an InputError."""
+    try:
+        yield
+    except Exception as error:  # numba's own class depends on its version
+        if "OUT_OF_MEMORY" not in str(error):
+            raise
+        raise InputError(
+            "the GPU has too little free memory for these views; close what else uses it, or use the cpu renderer"
+        ) from error

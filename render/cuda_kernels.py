@@ -17,7 +17,7 @@ from numba import cuda as numba_cuda
 from .colour_kernels import PLAIN, opaque, ray_colour, weights_along
 from .compile import SIMULATED
 from .culling_kernels import ATAN_ERROR, ERROR_32, LEAF, View, key_of, row_of
-from .scanline_kernels import bound, corner, covered, depth_plane
+from .scanline_kernels import bound, corner, covered, cross, depth_plane
 
 cuda: Any = numba_cuda  # its types are those of Python, not of kernels
 THREADS = 128  # in a block
@@ -59,8 +59,12 @@ def _apart(azimuth, other):
 
 
 @_device
-def _columns(a, b, c, view):
-    """The first column (0..width-1) that a triangle may be in, and the last one, which may exceed width - 1; see `find_candidates`."""
+def _columns(corners, i, view):
+    """The first column (0..width-1) that triangle i of a leaf may be in, and the last one, which may exceed width - 1.
+
+    See `find_candidates`.
+    """
+    a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
     az_a = math.atan2(np.float32(a[1]), np.float32(a[0]))
     az_b = math.atan2(np.float32(b[1]), np.float32(b[0]))
     az_c = math.atan2(np.float32(c[1]), np.float32(c[0]))
@@ -89,7 +93,7 @@ def clear(keys, queued):
 @_device
 def _set_up(a, b, c, cull):
     """Whether a triangle is seen from its front or, without `cull`, its back; its edges and its plane of depth."""
-    nx, ny, nz = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+    nx, ny, nz = cross(b, c)
     volume = a[0] * nx + a[1] * ny + a[2] * nz
     seen = abs(volume) >= 1e-200 and not (cull and volume > 0.0)
     volume = volume if seen else 1.0
@@ -135,41 +139,43 @@ def drawing_kernels(textured: bool) -> tuple[Any, Any]:
     Their arguments: `blocks`, `labels` and `cull`, of `Triangles`; `numbers`, the upper edge (rad), rows of rays in one radian, columns
     and rows of rays; `tangents`, of `Rays`; `eyes` (n, 4), x (m), y (m), heading (rad) and height (m); `directions` (n, 2, width), cosines
     and sines of the azimuths of the columns in the world; `lookup`, as `Lookup`, () in a plain world; `keys` (n, width, height) of rays,
-    see `key_of`; `queue` (m,), wide triangles, as view times triangles plus place, and their number `queued` (1,).
+    see `key_of`; `queue` (m,), wide triangles, each as
+    the number of its view times the number of triangles plus its own number; and how many they are, `queued` (1,).
     """
     draw_column = _column_drawer(textured)
+
+    @_device
+    def draw(i, corners, first, last, step, v, view, label, cull, tangents, directions, lookup, keys):
+        """Draw triangle i of a leaf in every `step`-th column from `first` to `last`."""
+        a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
+        seen, edges, plane = _set_up(a, b, c, cull)
+        if seen:
+            for column in range(first, last + 1, step):
+                at = column - view.width if column >= view.width else column
+                draw_column(edges, plane, at, v, label, view, directions, tangents, lookup, keys)
 
     @_kernel
     def draw_narrow(blocks, labels, cull, numbers, tangents, eyes, directions, lookup, keys, queue, queued):
         i, v = cuda.grid(1), cuda.blockIdx.y
         if i >= len(labels):
             return
-        view, corners, k = _view_of(eyes, numbers, v), blocks[i // LEAF], i % LEAF
-        a, b, c = corner(corners, 0, k, view), corner(corners, 1, k, view), corner(corners, 2, k, view)
-        first, last = _columns(a, b, c, view)
+        view, corners = _view_of(eyes, numbers, v), blocks[i // LEAF]
+        first, last = _columns(corners, i % LEAF, view)
         if last - first >= NARROW:
-            place = cuda.atomic.add(queued, 0, 1)
-            if place < len(queue):
-                queue[place] = v * len(labels) + i
+            number = cuda.atomic.add(queued, 0, 1)
+            if number < len(queue):
+                queue[number] = v * len(labels) + i
                 return
-        seen, edges, plane = _set_up(a, b, c, cull)
-        if seen:
-            for column in range(first, last + 1):
-                at = column - view.width if column >= view.width else column
-                draw_column(edges, plane, at, v, labels[i], view, directions, tangents, lookup, keys)
+        draw(i % LEAF, corners, first, last, 1, v, view, labels[i], cull, tangents, directions, lookup, keys)
 
     @_kernel
     def draw_wide(blocks, labels, cull, numbers, tangents, eyes, directions, lookup, keys, queue, queued):
-        for q in range(cuda.blockIdx.x, min(queued[0], len(queue)), cuda.gridDim.x):
-            v, i = queue[q] // len(labels), queue[q] % len(labels)
-            view, corners, k = _view_of(eyes, numbers, v), blocks[i // LEAF], i % LEAF
-            a, b, c = corner(corners, 0, k, view), corner(corners, 1, k, view), corner(corners, 2, k, view)
-            first, last = _columns(a, b, c, view)
-            seen, edges, plane = _set_up(a, b, c, cull)
-            if seen:
-                for column in range(first + cuda.threadIdx.x, last + 1, cuda.blockDim.x):
-                    at = column - view.width if column >= view.width else column
-                    draw_column(edges, plane, at, v, labels[i], view, directions, tangents, lookup, keys)
+        for number in range(cuda.blockIdx.x, min(queued[0], len(queue)), cuda.gridDim.x):
+            v, i = queue[number] // len(labels), queue[number] % len(labels)
+            view, corners = _view_of(eyes, numbers, v), blocks[i // LEAF]
+            first, last = _columns(corners, i % LEAF, view)
+            first, step = first + cuda.threadIdx.x, cuda.blockDim.x
+            draw(i % LEAF, corners, first, last, step, v, view, labels[i], cull, tangents, directions, lookup, keys)
 
     return draw_narrow, draw_wide
 

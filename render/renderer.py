@@ -56,9 +56,9 @@ def open_renderer(
     Args:
         world: The world.
         eye: The eye; None is the default `Eye`.
-        backend: "cpu" (exact), "cuda" (the same on a GPU of NVIDIA), "egl" or "osmesa" (OpenGL through pyrender), or "auto": the fastest.
-            For one view at a time, on every machine measured so far (CHANGELOG.md), that is the CPU renderer. `Renderer.backend` is the
-            one chosen.
+        backend: "cpu" (exact), "cuda" (the same but for rounding, on a GPU of NVIDIA: for many views at once), "egl" or "osmesa" (OpenGL
+            through pyrender), or "auto": the CPU renderer, which begins at once, and is faster than OpenGL on every machine measured so
+            far (docs/performance.md). `Renderer.backend` is the one chosen.
         threads: Threads of the CPU renderer; None uses every core that this process may run on. The others decide themselves.
 
     Raises:

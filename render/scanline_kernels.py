@@ -16,7 +16,7 @@ _SPANS = 512  # spans that are collected before they are drawn
 
 
 @compiled(inline="always")
-def _cross(a, b):
+def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -29,7 +29,7 @@ def corner(corners, k, i, view):
 @compiled(error_model="numpy", inline="always")
 def bound(a, b, volume):
     """The bound p cos az + q sin az + (low or high) on t by the edge (a, b). A bound from below has high = inf, others low = -inf."""
-    nx, ny, nz = _cross(a, b)
+    nx, ny, nz = cross(a, b)
     upright = abs(nz) < 1e-200  # then the bound is about +-1e200 and allows all of a column or nothing ..
     nz = 1e-200 if upright else nz
     slack = 1e150 if upright else 0.0  # .. but all of a column that lies in the plane
@@ -49,7 +49,7 @@ def covered(ab, bc, ca, cos, sin):
 def depth_plane(a, b, c, volume):
     """The vector whose product with a ray is the inverse distance."""
     # It is also the sum of the edges' normals, but only the differences of corners give it precisely.
-    gx, gy, gz = _cross((b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2]))
+    gx, gy, gz = cross((b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2]))
     scale = 1.0 / volume
     return gx * scale, gy * scale, gz * scale
 
@@ -119,7 +119,7 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
             i = found[k]
             first, last = np.int64(work[6 * LEAF + i]), np.int64(work[7 * LEAF + i])
             a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
-            nx, ny, nz = _cross(b, c)
+            nx, ny, nz = cross(b, c)
             volume = a[0] * nx + a[1] * ny + a[2] * nz
             if abs(volume) < 1e-200 or (cull and volume > 0.0):  # seen from its edge, or from its back
                 continue

@@ -1,27 +1,36 @@
-"""Laws of the CPU renderer that hold in worlds of any kind."""
+"""Laws of exact renderers that hold in worlds of any kind."""
 
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scenes import random_poses
 
 from tussock.render.eye import Eye
-from tussock.render.renderer import open_renderer
+from tussock.render.renderer import Renderer, open_renderer
 from tussock.render.scanline import ScanlineRenderer
 from tussock.world.scene import World
 
 
-def batches_and_threads_do_not_matter(renderer: ScanlineRenderer) -> None:
-    """A batch equals its views one by one, drawn with any number of threads, or by several threads at once."""
-    poses = random_poses(7)
+def batches_and_callers_do_not_matter(renderer: Renderer, poses: np.ndarray) -> None:
+    """A batch equals its views one by one, drawn by several threads at once, or by the same renderer in another process."""
     batch = renderer.render(poses)
     assert all(np.array_equal(view, renderer.render([pose])[0]) for view, pose in zip(batch, poses, strict=True))
+    with ThreadPoolExecutor(3) as threads:
+        assert all(np.array_equal(views, batch) for views in threads.map(renderer.render, [poses] * 6))
+    with pickle.loads(pickle.dumps(renderer)) as other:
+        assert np.array_equal(other.render(poses), batch)
+
+
+def batches_and_threads_do_not_matter(renderer: ScanlineRenderer) -> None:
+    """The same, with any number of threads of its own."""
+    poses = random_poses(7)
+    batches_and_callers_do_not_matter(renderer, poses)
+    batch = renderer.render(poses)
     for threads in (1, 3, 5):
         with ScanlineRenderer(renderer.world, renderer.eye, threads=threads) as other:
             assert np.array_equal(other.render(poses), batch)
             assert np.array_equal(other.render(poses[:1]), batch[:1])
-    with ThreadPoolExecutor(3) as threads:
-        assert all(np.array_equal(views, batch) for views in threads.map(renderer.render, [poses] * 6))
 
 
 def low_resolution_is_the_mean_over_each_pixels_solid_angle(world: World) -> None:

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from renderer_laws import batches_and_callers_do_not_matter
 from scenes import hills, mesh_world, post, random_poses, random_texture, random_world, textured_world, world_of
 
 from tussock.render.compile import SIMULATED
 from tussock.render.eye import Eye
 from tussock.render.poses import Poses
 from tussock.render.renderer import Renderer, open_renderer
-from tussock.world.errors import InputError, MissingDependencyError
+from tussock.world.errors import InputError, MissingDependencyError, SettingError
 from tussock.world.scene import World
 from tussock.world.textures import ALPHAS, FILTERS, WRAPS
 
@@ -85,7 +86,7 @@ def test_batches_and_an_empty_world(monkeypatch):
 
     with open_renderer(random_world(4, N), SMALL, "cuda") as renderer:
         whole = renderer.render(POSES)
-        assert np.array_equal(renderer.render(POSES[:1]), whole[:1])
+        batches_and_callers_do_not_matter(renderer, POSES[:2])
         assert renderer.render(np.empty((0, 3))).shape == (0, SMALL.height, SMALL.width, 4)
     monkeypatch.setattr(cuda, "RAYS", 1)
     with open_renderer(random_world(4, N), SMALL, "cuda") as renderer:
@@ -93,11 +94,25 @@ def test_batches_and_an_empty_world(monkeypatch):
     nothing = world_of(np.empty((0, 3, 3)), np.empty((0, 3)), ground=False)
     with open_renderer(nothing, SMALL, "cuda") as renderer:
         assert (renderer.render(POSES) == [*nothing.sky_rgb, 0]).all()
+        with pytest.raises(SettingError, match="pose 0"):
+            renderer.render([(0.0, np.nan, 0.0)])
+    renderer.close()
     with pytest.raises(InputError, match="closed"):
         renderer.render(POSES)
 
 
-def test_where_it_cannot_run_it_says_so():
+@pytest.mark.usefixtures("here")
+def test_too_little_memory_is_said(monkeypatch):
+    def full(*_):
+        raise RuntimeError("[CUresult.CUDA_ERROR_OUT_OF_MEMORY] Call to cuMemAlloc results in an error")
+
+    with open_renderer(random_world(n=1), SMALL, "cuda") as renderer:
+        monkeypatch.setattr(renderer, "_draw", full)
+        with pytest.raises(InputError, match="too little free memory"):
+            renderer.render(POSES)
+
+
+def test_without_a_gpu_the_reason_is_said():
     if SIMULATED:
         pytest.skip("there is a GPU, a simulated one")
     try:
@@ -110,11 +125,11 @@ def test_where_it_cannot_run_it_says_so():
 
 
 @pytest.mark.slow
-def test_in_the_simulator(tmp_path):
+def test_in_the_simulator():
     if SIMULATED:
         pytest.skip("this is the simulator")
     simulator = {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(Path(__file__))]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", str(Path(__file__))]
     done = subprocess.run(command, env=os.environ | simulator, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
-    assert "11 passed" in done.stdout
+    assert "14 passed, 1 skipped" in done.stdout

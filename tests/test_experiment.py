@@ -215,8 +215,13 @@ def test_auto_is_a_gpu_where_there_is_one(there, monkeypatch):
     assert chosen_device("cuda:1") == "cuda:1"
 
 
-def test_what_ran_on_a_device_says_on_which():
+def test_what_ran_on_a_device_says_on_which(tmp_path):
     assert settings_of(Experiment(device="auto"))["device"] == chosen_device("auto")
+    trained = TrainedModel(
+        model=PerfectMemory().fit(torch.rand(2, 5, 24)), encoding=Encoding.named("grey"), eye=Eye(width=24, height=5)
+    )
+    save_model(trained, tmp_path / "m.safetensors")
+    assert experiment_of({"model": str(tmp_path / "m.safetensors"), "device": "auto"}).device == chosen_device("auto")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from jaxtyping import Int
 from scipy.stats import norm
 from scipy.stats import t as student
 
-SAMPLES = 1000  # of a bootstrap: the ends of an interval are then good to about a twentieth of its width
+SAMPLES = 1000  # of a bootstrap: with 20 units and more the ends of an interval are then good to about a twentieth of its width
 CONFIDENCE = 0.95
 MIN_UNITS = 5  # with fewer, the few samples that exist say too little of others
 
@@ -61,7 +61,8 @@ def bootstrap(units: int, statistic: Statistic, samples: int = SAMPLES) -> tuple
     """The ends of the bootstrap interval of a statistic; nan for fewer than MIN_UNITS units. Arguments as of `effect_size`.
 
     Percentiles of the samples, a little farther out than 2.5 and 97.5 where there are few units ("expanded percentiles", Hesterberg 2015):
-    samples of n units vary less than the units did, by (n - 1) / n, and have the tails of a normal distribution, not of Student's t.
+    the variance of a mean over samples is too small, by the factor (n - 1) / n, and its tails are those of a normal distribution, not of
+    Student's t.
     """
     if units < MIN_UNITS:
         return math.nan, math.nan

@@ -61,7 +61,7 @@ class RouteTask:
         length: Of a generated route (m).
         eye: Through which the learner sees.
         encoding: What it gets of a view: a preset's name, a chain or an `Encoding`; None is the panorama itself.
-        renderer: "auto", "cpu", "egl" or "osmesa".
+        renderer: "auto", "cpu", "cuda", "egl" or "osmesa".
         offset: Episodes start up to this far to either side of the route's start (m).
         heading_noise: Standard deviation of the normal noise on every turn (rad).
         step_length: Length of the longest step (m).

@@ -7,7 +7,7 @@ from multiprocessing import forkserver
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # how these processes begin
 WORK = "tussock.navigation.sweeps.work"  # what they import
-# As Dask has it, each worker has one core. And no file of the current folder is taken for a library's, as `python -c` does.
+# Each worker has one core, as in Dask. With PYTHONSAFEPATH (Linux only, see below) no file of the current folder is taken for a library's.
 ENVIRONMENT = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PYTHONSAFEPATH"), "1")
 
 
