@@ -4,7 +4,7 @@ from tussock.world.errors import SettingError, first_line
 
 
 def chosen_device(device: str) -> str:
-    """The name of a device: for "auto", "cuda" where torch has a GPU, on which all models learn at least as fast (docs/performance.md), else "cpu"."""
+    """The name of a device; for "auto" it is "cuda" where torch has a GPU, else "cpu". All models learn at least as fast on a GPU."""
     if device != "auto":
         return device
     import torch
