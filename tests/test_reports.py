@@ -12,6 +12,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
+from browser import WIDTHS, in_browser
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
@@ -309,6 +310,23 @@ def test_the_main_result_is_on_the_first_screen(tmp_path):
     write_report(report(draw_two, headline="15 of 30 arrived."), tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.index("<h1>") < page.index("15 of 30 arrived.") < page.index("<dl>")
+
+
+def draw_wide():
+    for _ in range(2):
+        figure, axes = canvas()
+        axes[0, 0].plot([0, 1])
+        yield figure
+
+
+def test_a_tap_shows_figures_at_their_full_size_on_a_telephone(tmp_path):
+    write_report(report(draw_wide), tmp_path)
+    page, tapped = tmp_path / "report.html", tmp_path / "tapped.html"
+    tap = """<script>addEventListener("load", () => document.querySelectorAll(".image").forEach(each => each.click()));</script>"""
+    tapped.write_text(page.read_text(encoding="utf-8").replace("</body>", f"{tap}</body>"), encoding="utf-8")
+    assert in_browser(page, WIDTHS[0], tmp_path)["wide"] == []
+    assert set(in_browser(tapped, WIDTHS[0], tmp_path)["wide"]) == {"IMG."}
+    assert in_browser(tapped, WIDTHS[1], tmp_path)["wide"] == []
 
 
 def test_the_same_report_has_the_same_bytes(tmp_path):
