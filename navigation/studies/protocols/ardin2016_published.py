@@ -17,7 +17,7 @@ from ...reports.effects import Effect, bootstrap
 from ...reports.results import StudyResults
 from ...stopping import StoppingRules
 from ...training_setup import TrainingSetup
-from .effects import over_routes
+from .effects import least_over_routes
 from .figures import boxes_by_model, lines_by_model
 from .protocol import Item, Parameter, Protocol
 
@@ -26,6 +26,7 @@ NOTE = "Published as box plots only (figure 4D)."
 PUT_BACK = {"reset": "at the next waypoint", "reset-nearest": "at the nearest point"}  # by the setting on_lost
 SAMPLES = 4000  # of a bootstrap
 SHARE = "share of the way from perfect memory to random"
+MEMORIES = [PERFECT, BODY, INFOMAX]
 
 
 def _layout(route: Route) -> Route:
@@ -48,17 +49,8 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     displacement_cm = (100 * walks["offset_m"].abs()).round().astype(int)
     put_back = walks["on_lost"].map(PUT_BACK)
     walks = walks.assign(errors=walks["resets"].astype(float), displacement_cm=displacement_cm, put_back=put_back)
-    columns = [
-        "model",
-        "put_back",
-        "place",
-        "displacement_cm",
-        "offset_m",
-        "errors",
-        "arrived",
-        "steps",
-        "mean_deviation_m",
-    ]
+    kept = ["model", "put_back", "place", "displacement_cm", "offset_m", "errors", "arrived", "steps"]
+    columns = [*kept, "mean_deviation_m"]
     tables, numbers = {"walks": walks[columns]}, {}
     for name, some in walks[columns].groupby("put_back", sort=False):
         tables[f"walks {name}"] = some
@@ -112,6 +104,12 @@ def _errors(results: StudyResults, model: str) -> dict[str, float]:
     return {label: results.numbers[key] for key, label in labels.items() if key in results.numbers}
 
 
+def _tables(results: StudyResults) -> dict[str, pd.DataFrame]:
+    """The walks by where agents are put back."""
+    tables = {name: results.tables.get(f"walks {name}") for name in PUT_BACK.values()}
+    return {name: table for name, table in tables.items() if table is not None}
+
+
 @claim(
     "random-worst",
     "by-model",
@@ -121,14 +119,14 @@ def _errors(results: StudyResults, model: str) -> dict[str, float]:
 def _random_worst(results: StudyResults) -> Decision:
     """All three memories make fewer errors than a random choice of direction."""
     random = _errors(results, RANDOM)
-    others = [_errors(results, model) for model in (PERFECT, BODY, INFOMAX)]
+    others = [_errors(results, model) for model in MEMORIES]
     obtained = {label: value for each in (*others, random) for label, value in each.items()}
     worst = zip(*(each.values() for each in others), strict=True)
-    effect = over_routes(
+    effect = least_over_routes(
         "random's errors minus those of the worst other",
-        results.tables["walks"],
+        _tables(results),
         "errors",
-        lambda mean: mean[RANDOM] - mean.drop(RANDOM).max(),
+        lambda mean: mean[RANDOM] - mean[MEMORIES].max(),
     )
     return Decision(obtained, all(max(some) < most for some, most in zip(worst, random.values(), strict=True)), effect)
 
@@ -142,11 +140,11 @@ def _perfect_best(results: StudyResults) -> Decision:
     others = [_errors(results, model) for model in (BODY, INFOMAX, RANDOM)]
     obtained = {label: value for each in (perfect, *others) for label, value in each.items()}
     best = zip(*(each.values() for each in others), strict=True)
-    effect = over_routes(
+    effect = least_over_routes(
         "errors of the best other minus perfect memory's",
-        results.tables["walks"],
+        _tables(results),
         "errors",
-        lambda mean: mean.drop(PERFECT).min() - mean[PERFECT],
+        lambda mean: mean[[BODY, INFOMAX, RANDOM]].min() - mean[PERFECT],
     )
     return Decision(
         obtained, all(least <= min(some) for some, least in zip(best, perfect.values(), strict=True)), effect
@@ -169,7 +167,7 @@ def _body_close(results: StudyResults) -> Decision:
     }
     if any(map(math.isnan, shares.values())):
         return Decision(obtained, None)
-    worst = max(shares, key=lambda name: shares[name])
+    worst = max(shares, key=shares.__getitem__)
     low, high = (results.numbers[f"{SHARE}, {worst}, {end}"] for end in ("low", "high"))
     routes = results.tables["walks"]["place"].nunique()
     effect = Effect(label=f"{SHARE}, {worst}", value=shares[worst], low=low, high=high, units=routes, of="routes")

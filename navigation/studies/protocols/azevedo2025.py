@@ -46,7 +46,7 @@ def of_walk(row: dict[str, Any], steps: pd.DataFrame) -> dict[str, float]:
 
 def measure(walks: pd.DataFrame) -> StudyResults:
     """Mean displacement by the displacement of the start."""
-    walks = walks.assign(start_m=walks["offset_m"].abs(), reached=walks["last_displacement_m"].notna().astype(float))
+    walks = walks.assign(start_m=walks["offset_m"].abs(), reached=walks["last_displacement_m"].notna())
     grouped = walks.groupby("start_m")
     columns = {
         "walks": grouped.size(),

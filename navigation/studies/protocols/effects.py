@@ -1,6 +1,6 @@
 """Sizes of effects between models, with intervals from a bootstrap over routes: walks along one route are not independent."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -33,3 +33,11 @@ def over_routes(
         return float(statistic(pd.Series(means, index=sums.columns)))
 
     return effect_size(label, len(sums), of_routes, of="routes")
+
+
+def least_over_routes(
+    label: str, tables: Mapping[str, pd.DataFrame], column: str, statistic: Callable[[pd.Series], float]
+) -> Effect:
+    """The least of such effects in several tables of walks, for a claim that is about all of them; its label names the table."""
+    effects = (over_routes(f"{label}, {name}", walks, column, statistic) for name, walks in tables.items())
+    return min(effects, key=lambda effect: effect.value)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from ...intervals import mean_interval
+from ...intervals import positive_interval, share_interval
 from .protocol import Item, models_in
 
 
@@ -13,7 +13,7 @@ def intervals(walks: pd.DataFrame, measures: Mapping[str, str]) -> pd.DataFrame:
 
     Args:
         walks: One walk per row, with the columns "model" and "place".
-        measures: Columns, and what they are called.
+        measures: Columns, and what they are called; numbers that are never negative, or whether something is so.
 
     Returns:
         One row per measure and model, with the numbers of routes and walks.
@@ -23,7 +23,8 @@ def intervals(walks: pd.DataFrame, measures: Mapping[str, str]) -> pd.DataFrame:
         for model in models_in(walks):
             part = walks[walks["model"] == model].dropna(subset=[column])
             routes, _ = pd.factorize(part["place"])
-            mean = mean_interval(part[column].to_numpy(dtype=float), routes)
+            interval = share_interval if part[column].dtype == bool else positive_interval
+            mean = interval(part[column].to_numpy(dtype=float), routes)
             rows.append((label, model, part["place"].nunique(), len(part), mean.value, mean.low, mean.high))
     return pd.DataFrame(rows, columns=["measure", "model", "routes", "walks", "mean", "low", "high"])
 
