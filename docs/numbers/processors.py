@@ -83,14 +83,14 @@ def results(path: Path) -> Walks:
 
 def exact_table(values: Values) -> str:
     """One line for each setting."""
-    head = ["", "| `perfect-memory` with | arrived | other steps |", "|---|---|---|"]
+    head = ["", "| `perfect-memory`, older instructions of | arrived | other steps |", "|---|---|---|"]
     lines = [f"| {setting} | {of(each['arrived'])} | {each['other steps']} |" for setting, each in values.items()]
     return "\n".join(head + lines) + "\n"
 
 
 def learned_table(values: Values) -> str:
     """One line for each model."""
-    head = ["", "| entry | arrived | arrived, all older | other steps | end otherwise |", "|---|---|---|---|---|"]
+    head = ["", "| entry | arrived | arrived with older instructions | other steps | end otherwise |", "|---|---|---|---|---|"]
     lines = [
         f"| `{model}` | {of(each['usually'])} | {of(each['arrived'])} | {each['other steps']} | {each['end otherwise']} |"
         for model, each in values.items()
