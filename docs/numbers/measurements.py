@@ -3,8 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import comparison
 import eyes
 import pictures
+import processors
 import protocols
 from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
@@ -55,8 +57,10 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
-    eyes.MEASUREMENTS
+    comparison.MEASUREMENTS
+    | eyes.MEASUREMENTS
     | pictures.MEASUREMENTS
+    | processors.MEASUREMENTS
     | protocols.MEASUREMENTS
     | {
         "learning-walks": Measurement(
