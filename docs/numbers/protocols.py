@@ -261,6 +261,7 @@ FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables 
             "share": lambda values: number(values["claims"]["body-close"]["effects"][0]["value"]),
         },
     ),
+    "baddeley2012": ("baddeley2012", ["intervals"], {"means": means}),
     "kagioulis2024": ("kagioulis2024", ["intervals"], {"means": means}),
     "kagioulis2024-as-published": ("kagioulis2024 --as-published", ["intervals"], {"means": means}),
 }
