@@ -107,7 +107,7 @@ def number(value: float | None, digits: int = 2) -> str:
     """A number as a table has it."""
     if value is None or math.isnan(value):
         return "-"
-    return f"{value:.{digits}f}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{value:.{digits}f}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def with_interval(value: float | None, low: float | None, high: float | None, digits: int = 2) -> str:
@@ -223,6 +223,12 @@ def apiaviz(values: Values) -> str:
     return markdown(columns, rows)
 
 
+def completed(values: Values) -> str:
+    """Completed walks of each input, in a line."""
+    rows = [row for _, row in table(values, "by_input").iterrows()]
+    return ", ".join(f"{row['input']} {row['completed walks']:.0f} of {row['walks']:.0f}" for row in rows)
+
+
 def by_distance(values: Values) -> str:
     """What became of walks by the distance of their start from the route."""
     rows = []
@@ -261,8 +267,14 @@ FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables 
             "share": lambda values: number(values["claims"]["body-close"]["effects"][0]["value"]),
         },
     ),
+    "baddeley2012": ("baddeley2012", ["intervals"], {"means": means}),
     "kagioulis2024": ("kagioulis2024", ["intervals"], {"means": means}),
     "kagioulis2024-as-published": ("kagioulis2024 --as-published", ["intervals"], {"means": means}),
+    "apiaviz2026": (
+        f"apiaviz2026 {SUSSEX_WORLD}",
+        ["by_input", "differences"],
+        {"inputs": apiaviz, "counts": completed},
+    ),
 }
 MEASUREMENTS: dict[str, Measurement] = {
     name: replication(name, arguments, tables=tables, texts=texts)

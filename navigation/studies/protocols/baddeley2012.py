@@ -55,9 +55,9 @@ def measure(walks: pd.DataFrame) -> StudyResults:
 def _follows(results: StudyResults, model: str) -> Decision:
     share = float(results.numbers[f"arrived without an error, {model}"])
     effect = over_routes(
-        "walks that arrive without an error", results.tables["walks"], "flawless", lambda mean: mean[model]
+        f"walks that arrive without an error, {model}", results.tables["walks"], "flawless", lambda mean: mean[model]
     )
-    return Decision({"walks that arrive without an error": share}, share >= MOSTLY, effect)
+    return Decision({f"walks that arrive without an error, {model}": share}, share >= MOSTLY, effect)
 
 
 @claim(
