@@ -55,14 +55,6 @@ def test_importing_tussock_loads_nothing_heavy():
     assert done.stdout == "set()\n"
 
 
-@pytest.mark.parametrize(("before", "after"), [({}, "passive"), ({"OMP_WAIT_POLICY": "active"}, "active")])
-def test_waiting_threads_of_torch_leave_the_cores_to_others(before, after):
-    code = "import os, tussock; print(os.environ['OMP_WAIT_POLICY'])"
-    environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"} | before
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == after
-
-
 @pytest.mark.parametrize(
     ("arguments", "unneeded"),
     [
