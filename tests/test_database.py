@@ -232,6 +232,7 @@ def assert_all_files_are_complete(out: Path):
         read_image(path)
 
 
+@pytest.mark.slow
 def test_a_killed_process_leaves_a_valid_database_that_can_be_completed(tmp_path, renderer):
     out, moments = tmp_path / "d", random.Random(4)
     for _ in range(3):

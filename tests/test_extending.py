@@ -90,6 +90,7 @@ def test_names_of_installed_classes_are_listed(installed, tmp_path):
     assert "Is the mean difference as good a guide" in run(["replicate", "--help"], installed, tmp_path).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "workers"), [("nearest", 1), pytest.param("antlab.models:Nearest", 2, marks=pytest.mark.slow)]
 )
@@ -141,6 +142,7 @@ def test_a_class_with_fit_and_scan_alone_is_a_model(tmp_path):
     assert "derive it from tussock.navigation.models.base.Model" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_model_file_imports_nothing_by_itself(source, installed, tmp_path):
     trained = ["train", *SMALL, "--encoding", "grey | threshold 0.4 | resize 1"]
     named = ["--model", "antlab.models:Nearest", "--use", "antlab.encodings:Threshold"]

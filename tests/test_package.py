@@ -77,6 +77,7 @@ def test_a_command_loads_nothing_heavy_that_it_does_not_need(arguments, unneeded
     assert not set(unneeded.split()) & set(loaded)
 
 
+@pytest.mark.slow
 def test_worlds_views_and_databases_do_without_torch(tmp_path):
     for arguments in (
         "world --preset tiny --out w.ply --picture w.png",
@@ -125,6 +126,7 @@ seed = { from = 0, to = 1 }
 """
 
 
+@pytest.mark.slow
 def test_nor_do_those_of_the_same_names_as_a_library(folder):
     (folder / "coverage").mkdir()  # which numba looks for
     (folder / "bin").mkdir()

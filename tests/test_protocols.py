@@ -471,6 +471,7 @@ def is_replicated(result: dict, name: str, folder: Path) -> None:
     assert f"tussock replicate {name} --quick --out nobody2030" in page
 
 
+@pytest.mark.slow
 def test_a_protocol_of_another_package_can_be_replicated(package):
     """Its workers find it as well."""
     name = "nobody2030"

@@ -90,7 +90,11 @@ def exact_table(values: Values) -> str:
 
 def learned_table(values: Values) -> str:
     """One line for each model."""
-    head = ["", "| entry | arrived | arrived with older instructions | other steps | end otherwise |", "|---|---|---|---|---|"]
+    head = [
+        "",
+        "| entry | arrived | arrived with older instructions | other steps | end otherwise |",
+        "|---|---|---|---|---|",
+    ]
     lines = [
         f"| `{model}` | {of(each['usually'])} | {of(each['arrived'])} | {each['other steps']} | {each['end otherwise']} |"
         for model, each in values.items()
