@@ -251,11 +251,8 @@ class Experiment(Surroundings):
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
         with self.open_renderer(world) as renderer:
-            log.info(
-                f"renderer: {renderer.backend}"
-                if self.device == "cpu"
-                else f"renderer: {renderer.backend}, device: {self.device}"
-            )
+            device = "" if self.device == "cpu" else f", device: {self.device}"
+            log.info(f"renderer: {renderer.backend}{device}")
             yield self.train(renderer, route, progress)
 
     def run(self, progress: Progress = no_progress) -> "Trajectory":

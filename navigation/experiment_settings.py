@@ -21,7 +21,6 @@ from tussock.world.meshes.reading import MeshReading
 
 from .body import Body
 from .content import label_of
-from .devices import chosen_device
 from .experiment import MODEL_SUFFIX, Experiment
 from .settings_table import FIELDS, TYPES, as_field, as_setting, fields_of, read_settings
 from .stopping import StoppingRules
@@ -116,7 +115,7 @@ def _trained(given: Mapping[str, Any], models: "dict[Path, TrainedModel]") -> "T
 
     path = Path(name)
     if path not in models:
-        models[path] = load_model(path, device=chosen_device(given.get("device", "cpu")))
+        models[path] = load_model(path, device=given.get("device", "cpu"))
     return models[path]
 
 

@@ -139,8 +139,8 @@ def drawing_kernels(textured: bool) -> tuple[Any, Any]:
     Their arguments: `blocks`, `labels` and `cull`, of `Triangles`; `numbers`, the upper edge (rad), rows of rays in one radian, columns
     and rows of rays; `tangents`, of `Rays`; `eyes` (n, 4), x (m), y (m), heading (rad) and height (m); `directions` (n, 2, width), cosines
     and sines of the azimuths of the columns in the world; `lookup`, as `Lookup`, () in a plain world; `keys` (n, width, height) of rays,
-    see `key_of`; `queue` (m,), wide triangles, each as
-    the number of its view times the number of triangles plus its own number; and how many they are, `queued` (1,).
+    see `key_of`; `queue` (m,), wide triangles, each as the number of its view times the number of triangles plus its own number; and how
+    many they are, `queued` (1,).
     """
     draw_column = _column_drawer(textured)
 

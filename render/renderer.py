@@ -56,7 +56,7 @@ def open_renderer(
     Args:
         world: The world.
         eye: The eye; None is the default `Eye`.
-        backend: "cpu" (exact), "cuda" (the same but for rounding, on a GPU of NVIDIA: for many views at once), "egl" or "osmesa" (OpenGL
+        backend: "cpu" (exact), "cuda" (the same but for rounding, on an NVIDIA GPU: for many views at once), "egl" or "osmesa" (OpenGL
             through pyrender), or "auto": the CPU renderer, which begins at once, and is faster than OpenGL on every machine measured so
             far (docs/performance.md). `Renderer.backend` is the one chosen.
         threads: Threads of the CPU renderer; None uses every core that this process may run on. The others decide themselves.

@@ -121,7 +121,7 @@ def test_without_a_gpu_the_reason_is_said():
         reason = str(error)
     else:
         pytest.skip("there is a GPU")
-    assert re.search(r"needs (numba-cuda|a GPU of NVIDIA).*use the cpu renderer", reason)
+    assert re.search(r"needs (numba-cuda|an NVIDIA GPU).*use the cpu renderer", reason)
 
 
 @pytest.mark.slow

@@ -3,10 +3,9 @@
 import json
 import subprocess
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
-from measurement import ROOT, Measurement, Values, sussex, tussock
+from measurement import ROOT, Measurement, Values, markdown, sussex, tussock
 
 from tussock.navigation.models import MODELS as REGISTRY
 
@@ -75,7 +74,7 @@ def errors_of(values: Values, setting: str, model: str) -> list[str]:
 def readme_table(values: Values) -> str:
     """A choice of models and settings."""
     lines = ([f"`{model}`, {setting}{note}", *errors_of(values, setting, model)] for model, setting, note in README)
-    return table(["model and encoding", *(f"{route}: median, mean" for route in ROUTES)], lines)
+    return markdown(["model and encoding", *(f"{route}: median, mean" for route in ROUTES)], lines)
 
 
 def models_table(values: Values) -> str:
@@ -87,7 +86,7 @@ def models_table(values: Values) -> str:
         return [f"`{model}`", *errors_of(values, EDGES, model), arrived, f"{results[0]['memory_bytes'] / 1e6:.2g}"]
 
     head = ["model", "ant1: median, mean error (degrees)", "ant4", "arrived on ant1, ant4", "memory, MB"]
-    return table(head, map(line, MODELS))
+    return markdown(head, map(line, MODELS))
 
 
 def oracle_table(values: Values) -> str:
@@ -99,19 +98,12 @@ def oracle_table(values: Values) -> str:
         everywhere, room = (values["dense"][where][name] for where in ("all positions", "with 2 cm of room"))
         return [title, *(pair(everywhere[band]) for band in bands), pair(room["all"])]
 
-    return table(head, (line(name, title) for name, title in ORACLE_ROWS.items()))
+    return markdown(head, (line(name, title) for name, title in ORACLE_ROWS.items()))
 
 
 def pair(band: Values) -> str:
     """The median and the mean of errors."""
     return f"{band['median_error_deg']:.1f}, {band['mean_error_deg']:.1f}"
-
-
-def table(head: Iterable[str], lines: Iterable[Iterable[str]]) -> str:
-    """A table in Markdown, as the text of a mark."""
-    head = list(head)
-    rows = [head, ["---"] * len(head), *lines]
-    return "\n" + "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
 def sparse_mean(values: Values, where: str) -> str:

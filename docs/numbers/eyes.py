@@ -6,7 +6,7 @@ from pathlib import Path
 
 import attrs
 import numpy as np
-from measurement import Measurement, Values, of
+from measurement import Measurement, Values, markdown, of
 
 from tussock import Encoding, Experiment, Eye
 from tussock.navigation.encoding_steps import PixelStep
@@ -62,13 +62,8 @@ def table(values: Values) -> str:
         arrived = [each for each in deviations if each is not None]
         return f"{of([len(arrived), len(deviations)])}, {100 * np.mean(arrived):.1f} cm" if arrived else "0"
 
-    lines = [
-        "",
-        "| field | `Eye(field=...)`: arrived, off the route | columns blanked in the encoding |",
-        "|---|---|---|",
-    ]
-    lines += [f"| {field} | {cell(ways['eye'])} | {cell(ways['blank'])} |" for field, ways in values.items()]
-    return "\n".join(lines) + "\n"
+    rows = ([field, cell(ways["eye"]), cell(ways["blank"])] for field, ways in values.items())
+    return markdown(["field", "`Eye(field=...)`: arrived, off the route", "columns blanked in the encoding"], rows)
 
 
 MEASUREMENTS: dict[str, Measurement] = {

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from measurement import RESULTS, Measurement, Values, of, tussock
+from measurement import RESULTS, Measurement, Values, markdown, of, tussock
 
 from tussock.navigation.sweeps.store import Store, read_steps
 
@@ -83,23 +83,17 @@ def results(path: Path) -> Walks:
 
 def exact_table(values: Values) -> str:
     """One line for each setting."""
-    head = ["", "| `perfect-memory`, older instructions of | arrived | other steps |", "|---|---|---|"]
-    lines = [f"| {setting} | {of(each['arrived'])} | {each['other steps']} |" for setting, each in values.items()]
-    return "\n".join(head + lines) + "\n"
+    rows = ([setting, of(each["arrived"]), str(each["other steps"])] for setting, each in values.items())
+    return markdown(["`perfect-memory`, older instructions of", "arrived", "other steps"], rows)
 
 
 def learned_table(values: Values) -> str:
     """One line for each model."""
-    head = [
-        "",
-        "| entry | arrived | arrived with older instructions | other steps | end otherwise |",
-        "|---|---|---|---|---|",
-    ]
-    lines = [
-        f"| `{model}` | {of(each['usually'])} | {of(each['arrived'])} | {each['other steps']} | {each['end otherwise']} |"
+    rows = (
+        [f"`{model}`", of(each["usually"]), of(each["arrived"]), str(each["other steps"]), str(each["end otherwise"])]
         for model, each in values.items()
-    ]
-    return "\n".join(head + lines) + "\n"
+    )
+    return markdown(["entry", "arrived", "arrived with older instructions", "other steps", "end otherwise"], rows)
 
 
 COMMAND = "`tussock benchmark --model NAME`, with variables of the environment"

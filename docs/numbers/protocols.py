@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from measurement import Measurement, Values, sussex, tussock
+from measurement import Measurement, Values, markdown, sussex, tussock
 
 Texts = Mapping[str, Callable[[Values], str]]
 NAMES = {
@@ -116,12 +116,6 @@ def with_interval(value: float | None, low: float | None, high: float | None, di
         "" if low is None or high is None or math.isnan(low) else f" ({number(low, digits)} to {number(high, digits)})"
     )
     return number(value, digits) + ends
-
-
-def markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table between line breaks, so that it may stand between marks."""
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n\n" + "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n\n"
 
 
 def table(values: Values, name: str) -> pd.DataFrame:

@@ -104,7 +104,7 @@ class ViewOptions(MeshOptions):
     size: str | None = None
     """Columns x rows of a panorama; a pixel wider than a degree is averaged from several rays. Default: 720x150, or the model file's."""
     renderer: str = default(Surroundings, "renderer")
-    """auto (cpu), cpu, cuda (a GPU of NVIDIA, for many views at once), egl or osmesa."""
+    """auto (cpu), cpu, cuda (an NVIDIA GPU, for many views at once), egl or osmesa."""
     samples: int | None = None
     """Rays along each side of a pixel. Default: 1 where a pixel is at most a degree wide, else 4."""
     eye_height_m: float | None = None

@@ -18,7 +18,7 @@ from tussock.world.errors import FileError, SettingError, first_line
 from tussock.world.settings import instance_of, settings
 from tussock.world.specs import Spec
 
-from ..devices import check_device
+from ..devices import check_device, chosen_device
 from ..encoding import OLD_NAMES, STEPS, Encoding
 from ..feature_mask import FeatureMask
 from .base import FamiliarityModel, Model
@@ -134,12 +134,13 @@ def load_model(path: str | os.PathLike, *, expect: str | None = None, device: st
     Args:
         path: The file.
         expect: Name of the model that it must hold; None means any.
-        device: Where the model scans.
+        device: Where the model scans; "auto" is a GPU where there is one.
 
     Raises:
         FileError: For a file that is not a model file, is damaged, or holds another model than `expect`.
         SettingError: For a device that cannot be used, or has too little memory.
     """
+    device = chosen_device(device)
     check_device(device)
     expected = None if expect is None else model_in_files(make_model(expect))
     path = Path(path)

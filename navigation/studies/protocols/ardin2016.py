@@ -20,8 +20,8 @@ PERFECT, BODY, INFOMAX, RANDOM = "perfect-memory", "mushroom-body", "infomax", "
 NOTE = "Published as box plots only (figure 4D)."
 # As `ARDIN2016` in navigation/models/mushroom_body.py.
 ARDIN = "overlap_deg=0 cells=20000 inputs=10 active=0.003 outputs=1 learning=depression traversals=1"
-# Ours, for views of 180 x 10 pixels: chosen in seven generated worlds that the protocol does not use (seeds 100 to 105, 108), where 3 to 5
-# times as much makes the weights of some grow without bound, and the rate for views in 0..1, a thirtieth, learns little.
+# Ours, for views of 180 x 10 pixels, chosen in seven generated worlds that the protocol does not use (seeds 100 to 105, 108). There the
+# rate for views in 0..1, a thirtieth of this one, learns little. With 3 to 5 times this rate, weights grow without bound in some worlds.
 INFOMAX_RATE = 30 / 1800**2
 MODELS = (PERFECT, f"{BODY} {ARDIN}", f"{INFOMAX} rate={INFOMAX_RATE:.3g}", RANDOM)
 

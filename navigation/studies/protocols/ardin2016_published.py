@@ -49,8 +49,11 @@ def measure(walks: pd.DataFrame) -> StudyResults:
     displacement_cm = (100 * walks["offset_m"].abs()).round().astype(int)
     put_back = walks["on_lost"].map(PUT_BACK)
     walks = walks.assign(errors=walks["resets"].astype(float), displacement_cm=displacement_cm, put_back=put_back)
-    kept = ["model", "put_back", "place", "displacement_cm", "offset_m", "errors", "arrived", "steps"]
-    columns = [*kept, "mean_deviation_m"]
+    settings, measured = (
+        ["model", "put_back", "place", "displacement_cm", "offset_m"],
+        ["arrived", "steps", "mean_deviation_m"],
+    )
+    columns = [*settings, "errors", *measured]
     tables, numbers = {"walks": walks[columns]}, {}
     for name, some in walks[columns].groupby("put_back", sort=False):
         tables[f"walks {name}"] = some

@@ -82,7 +82,7 @@ def boxes_by_model(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
 
 
 def means_by_model(intervals: pd.DataFrame, measure: str, label: str) -> Figure:
-    """Means with their intervals, one line per model; where most values are equal, as counts of rare events, boxes would show nothing.
+    """Means with their intervals, one bar per model; where most values are equal, as counts of rare events, boxes would show nothing.
 
     Args:
         intervals: A table of `intervals`.

@@ -75,7 +75,7 @@ def _lower(results: StudyResults, number: str, label: str, column: str, model: s
     )
     clearly = (
         math.isnan(effect.low) or effect.low > 0
-    )  # with few routes, whose claims count for nothing, there is no interval
+    )  # few routes give no interval, and reports do not test their claims
     return Decision(obtained, None if perfect == other else other < perfect and clearly, effect)
 
 
