@@ -8,6 +8,7 @@ settings that it consists of, and nowhere else. Importing this module is light: 
 """
 
 import logging
+import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +24,7 @@ from tussock.world.specs import Spec, takes
 
 from .body import Body
 from .devices import check_device, chosen_device
+from .displacement import Displacement
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -39,7 +41,8 @@ if TYPE_CHECKING:
     from .models.files import TrainedModel
     from .training import TrainingViews
     from .trajectory import Trajectory
-    from .walk import Step, Walk
+    from .walk import Walk
+    from .walker import Step
 
 log = logging.getLogger(__name__)
 MODEL_SUFFIX = ".safetensors"  # of files of trained models
@@ -97,6 +100,9 @@ class Experiment(Surroundings):
         training: Which views are learned. A model from a file has learned already.
         body: How the agent moves.
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
+        release: The walk starts this far from the route's end instead (m), facing it. 0: at the route's start.
+        release_direction: In which direction of the world from there (rad, counter-clockwise from east).
+        displacement: Where the agent is carried to the side of the route.
         stopping: When the walk ends.
         device: Where the model learns and scans: "cpu", "cuda", another device of torch, or "auto": a GPU, if any.
     """
@@ -107,6 +113,9 @@ class Experiment(Surroundings):
     training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
     start_offset: float = number(0.0, unit="m")
+    release: float = number(0.0, low=0, unit="m")
+    release_direction: float = number(0.0, unit="rad")
+    displacement: Displacement = instance_of(Displacement, attrs.Factory(Displacement), "a Displacement")
     stopping: StoppingRules = instance_of(StoppingRules, attrs.Factory(StoppingRules), "StoppingRules")
     device: str = attrs.field(default="cpu", converter=chosen_device)
 
@@ -160,6 +169,11 @@ class Experiment(Surroundings):
 
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
+        from tussock.world.geometry import Pose
+
+        if self.release:
+            towards = Pose(route.goal.x, route.goal.y, self.release_direction + math.pi)
+            return towards.moved(-self.release).rounded()
         return route.start.moved(0.0, self.start_offset).rounded()
 
     def train(
@@ -246,7 +260,7 @@ class Experiment(Surroundings):
     @contextmanager
     def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
         """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
-        from .walk import check_inside
+        from .walker import check_inside
 
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
@@ -285,6 +299,7 @@ def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Rou
         starts=[each.start(route) for each in experiments],
         body=[each.body for each in experiments],
         stopping=[each.stopping for each in experiments],
+        displacement=[each.displacement for each in experiments],
         noise=[default_rng(each.seed) for each in experiments],
     )
 
