@@ -96,15 +96,15 @@ def _move(world: World, start, end, radius, slides: int) -> Contact:
     np.minimum.at(room, body, _facing(shapes, start[body], step[body])[0])
     size = np.clip(room, MARGIN, size)
 
-    position, left, ended = start, step, np.zeros(len(start), dtype=bool)
-    touched, normals = ended, np.full_like(start, np.nan)
+    position, left = start, step
+    touched, normals = np.zeros(len(start), dtype=bool), np.full_like(start, np.nan)
     for _ in range(slides + 1):
         share, normal = _first_contact(shapes, body, position, left, size)
         hit = np.isfinite(share)
         normals = np.where((hit & ~touched)[:, None], normal, normals)
         touched = touched | hit
-        position = np.where(hit[:, None], position + np.where(hit, share, 0.0)[:, None] * left, position + left)
-        rest = (1 - share)[:, None] * left
+        made = np.where(hit, share, 1.0)[:, None]
+        position, rest = position + made * left, (1 - made) * left
         rest = rest - _dot(rest, normal)[:, None] * normal
         on = hit & (_dot(rest, step) > 0)
         if not on.any():
