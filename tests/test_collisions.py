@@ -161,6 +161,15 @@ def test_a_body_walks_out_of_what_it_is_in_but_not_further_in(move):
     np.testing.assert_allclose(contact.normals[1], [0, -1], atol=1e-9)
 
 
+@MOVES
+def test_from_the_middle_of_a_footprint_every_way_leads_out(move):
+    world = world_of([[(0, 0, 0.02), (3 / 64, 0, 0.02), (0, 4 / 64, 0.02)]], np.zeros((1, 3)))
+    angle = np.linspace(-3, 3, 40)
+    start = np.full((40, 2), 1 / 64)  # as far from each edge
+    end = start + 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert not move(world, start, end, 0.01).touched.any()
+
+
 def test_from_a_blade_of_grass_a_body_goes_to_either_side_and_through_no_other():
     world = bare(wall((0, -1), (0, 1)), wall((0.03, -1), (0.03, 1)))
     start = np.zeros((2, 2))

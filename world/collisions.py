@@ -6,8 +6,8 @@ comes within its radius of an edge or a corner.
 
 A body that begins a step closer to an obstacle than its radius, such as at a start among stems, is for this step as small as its
 clearance there. So no step ends closer to any obstacle than it began, and the body gets out wherever its middle finds a way. Where
-its middle is inside a footprint, it may only go towards the nearest edge. Without area there is no inside: from exactly on a blade
-of grass it may go to either side.
+its middle is inside a footprint, it may only go where the nearest edge of that gets no farther away. Without area there is no inside:
+from exactly on a blade of grass it may go to either side. A body inside a stone, whose footprints share edges, may so be held.
 
 The distance to a convex shape is a convex function along a line. So a step that does not come closer at first never does, and a
 shape that the body touches matters only if the step leads towards it.
