@@ -5,7 +5,7 @@ ground, many of them without area, such as a blade of grass. The first contact i
 comes within its radius of an edge or a corner.
 
 A body that begins a step closer to an obstacle than its radius, such as at a start among stems, is for this step as small as its
-clearance there. So no step ends closer to any obstacle than it began, and the body gets out wherever its middle finds a way. Where
+clearance there. Its clearance never falls below that, and it gets out wherever a body of that size finds a way. Where
 its middle is inside a footprint, it may only go where the nearest edge of that gets no farther away. Without area there is no inside:
 from exactly on a blade of grass it may go to either side. A body inside a stone, whose footprints share edges, may so be held.
 
