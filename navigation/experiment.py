@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import converted, instance_of, number, settings
 from tussock.world.specs import Spec, takes
@@ -25,6 +25,7 @@ from tussock.world.specs import Spec, takes
 from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
+from .experiment_fields import as_encoding, as_model, as_navigator
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -45,48 +46,6 @@ if TYPE_CHECKING:
     from .walker import Step
 
 log = logging.getLogger(__name__)
-MODEL_SUFFIX = ".safetensors"  # of files of trained models
-
-
-def _encoding(value: Any, experiment: Any = None) -> Any:
-    """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
-    from .encoding import PRESETS, Encoding, automatic_resize
-
-    if isinstance(value, Encoding):
-        return value
-    if not isinstance(value, str):
-        raise SettingError(f"encoding is {value!r}; give a preset's name, a chain or an Encoding")
-    return Encoding.named(value, resize=automatic_resize(experiment.eye) if value in PRESETS else 1.0)
-
-
-def _model(value: Any) -> Any:
-    """A model from its spec, its file or an untrained one."""
-    if isinstance(value, Path) or (isinstance(value, str) and value.endswith(MODEL_SUFFIX)):
-        if not Path(value).is_file():
-            raise FileError(f"there is no model file {value}; check the name")
-        return Path(value)
-    if isinstance(value, Spec):
-        return value
-    from .models import MODELS, model_spec
-    from .models.base import Model
-    from .models.opponents import Opponent
-
-    if isinstance(value, Model) and (value.shape is not None or value.seed or value.device != "cpu"):
-        raise SettingError(
-            f"{value!r} has learned, or has a seed or device; give an untrained model, and seed and device to the experiment"
-        )
-    return model_spec(str(value)) if isinstance(value, str | Opponent) else MODELS.spec_of(value)
-
-
-def _navigator(value: Any) -> Any:
-    """A navigator from its spec."""
-    from .steering import NAVIGATORS
-
-    if isinstance(value, str):
-        return NAVIGATORS.spec(value)
-    if isinstance(value, Spec | type):
-        return value if isinstance(value, Spec) else NAVIGATORS.spec_of(value)
-    raise SettingError(f"navigator is {value!r}; give a spec, such as 'scan', or a class")
 
 
 @settings
@@ -107,9 +66,9 @@ class Experiment(Surroundings):
         device: Where the model learns and scans: "cpu", "cuda", another device of torch, or "auto": a GPU, if any.
     """
 
-    encoding: "Encoding" = converted(default="edges", converter=_encoding, takes_self=True)
-    navigator: Spec = converted(default="scan", converter=_navigator)
-    model: Spec | Path = converted(default="perfect-memory", converter=_model)
+    encoding: "Encoding" = converted(default="edges", converter=as_encoding, takes_self=True)
+    navigator: Spec = converted(default="scan", converter=as_navigator)
+    model: Spec | Path = converted(default="perfect-memory", converter=as_model)
     training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
     start_offset: float = number(0.0, unit="m")
@@ -127,7 +86,7 @@ class Experiment(Surroundings):
         check_device(self.device)
         if self.route_database is not None and self.training.is_of_worlds:
             raise SettingError(
-                "--spacing-m and --parallel-views are of worlds; an image database has its views: give --every instead"
+                "--spacing-m, --parallel-views and --goal-walk-m are of worlds; an image database has its views: give --every instead"
             )
         if isinstance(self.model, Spec):
             model = self.make_model()  # refuses bad parameters

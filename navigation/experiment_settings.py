@@ -22,7 +22,8 @@ from tussock.world.meshes.reading import MeshReading
 from .body import Body
 from .content import label_of
 from .displacement import Displacement
-from .experiment import MODEL_SUFFIX, Experiment
+from .experiment import Experiment
+from .experiment_fields import MODEL_SUFFIX
 from .settings_table import FIELDS, TYPES, as_field, as_setting, fields_of, read_settings
 from .stopping import StoppingRules
 from .surroundings import OF_WORLDS, Surroundings

@@ -42,4 +42,4 @@ class TrainingSetup:
     @property
     def is_of_worlds(self) -> bool:
         """Whether it asks for views that image databases, which have their own, cannot give."""
-        return self.spacing != type(self)().spacing or self.parallel_views > 0
+        return self.spacing != type(self)().spacing or self.parallel_views > 0 or self.goal_walk > 0

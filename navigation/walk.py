@@ -15,6 +15,7 @@ from jaxtyping import UInt8
 
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
+from tussock.world.collisions import slid, stopped
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Pose, Route
 
@@ -144,19 +145,23 @@ class Walk:
 
     def _collide(self, agents: Sequence[Walker]) -> None:
         """Let obstacles stop the steps that agents have just made, or turn them aside."""
-        if not agents:
-            return
-        from tussock.world.collisions import slid, stopped
-
         for collisions, move in (("stop", stopped), ("slide", slid)):
             those = [agent for agent in agents if agent.body.collisions == collisions]
-            for radius in {agent.body.radius for agent in those}:
-                alike = [agent for agent in those if agent.body.radius == radius]
-                ways = np.array([(agent.trodden[0][:2], agent.pose[:2]) for agent in alike])  # type: ignore[index]
-                contact = move(self.world, ways[:, 0], ways[:, 1], radius)
-                for agent, (x, y), touched in zip(alike, contact.reached.tolist(), contact.touched, strict=True):
-                    if touched:
-                        agent.block(x, y)
+            if not those:
+                continue
+            starts, ends = (
+                np.array([pose[:2] for pose in poses]) for poses in zip(*map(_last_step, those), strict=True)
+            )
+            contact = move(self.world, starts, ends, np.array([agent.body.radius for agent in those]))
+            for agent, (x, y), touched in zip(those, contact.positions.tolist(), contact.touched.tolist(), strict=True):
+                if touched:
+                    agent.block(x, y)
+
+
+def _last_step(agent: Walker) -> tuple[Pose, Pose]:
+    """Where an agent stood before its step, and where it stands now."""
+    assert agent.trodden is not None
+    return agent.trodden[0], agent.pose
 
 
 def _each(setting: Any, count: int) -> Sequence[Any]:

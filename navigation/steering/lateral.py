@@ -21,7 +21,8 @@ class Lateral:
         turn = gain (unfamiliarity of the left memory - unfamiliarity of the right one), at most max_turn
 
     A view that the memory of views to the left of the way finds familiar faces left of the way, and the agent turns right. On the way
-    both find the view equally unfamiliar. Wystrach et al. (2020) describe the idea; Steinbeck et al. (2024) and Gattaux et al. (2025) steer by it.
+    both find the view equally unfamiliar. Wystrach et al. (2020) describe the idea; Steinbeck et al. (2024) and Gattaux et al. (2025)
+    steer by it.
 
     Attributes:
         model: Of which each memory is a copy.
