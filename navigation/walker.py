@@ -185,7 +185,8 @@ class Walker:
 
     def step(self, motion: Motion, row: int, view: np.ndarray | None, encoded: torch.Tensor | None) -> Step:
         """Do as a row of a motion says."""
-        stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
+        stopping, body, pose = self.stopping, self.body, self.pose
+        scan = motion.scan if motion.scan is not None and motion.scan.window[row].any() else None
         aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
         noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
         facing = pose.turned(aim + noise).rounded()

@@ -57,4 +57,5 @@ class Lateral:
         left, right = self.left.unfamiliarity(look.views), self.right.unfamiliarity(look.views)
         turn = (self.gain * (left - right)).clip(-self.max_turn, self.max_turn)
         step = (1 - self.slowing * np.minimum(left, right)).clip(self.slowest, 1.0)
-        return Motion(turn=turn, step=step, signals={"left": left, "right": right})
+        certainty = (1 - np.minimum(left, right)).clip(0, 1)
+        return Motion(turn=turn, step=step, certainty=certainty, signals={"left": left, "right": right})

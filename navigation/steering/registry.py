@@ -11,5 +11,7 @@ NAVIGATORS = Registry(
         "scan": f"{_HERE}.scan:Scan",
         "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan",
         "lateral": f"{_HERE}.lateral:Lateral",
+        "blend": f"{_HERE}.blend:Blend",
+        "loop-breaker": f"{_HERE}.loop_breaker:LoopBreaker",
     },
 )
