@@ -14,7 +14,6 @@ from .products import dot_products
 
 NEGLIGIBLE = 1e-6  # weight of a rotation, as a share of the largest, that changes no average in float32
 ROTATIONS = 6144  # of views that a model scores at once; what is held on the way is then 100 MB or so
-
 ALONE = 2**15  # pixels of a view from which on torch's threads share the sum of one view, but not those of several
 
 
