@@ -96,8 +96,9 @@ class Motion:
         turn[rows] = self.turn
         parts = [np.zeros((n, scan.window.shape[1]), dtype) for dtype in (np.float32, bool)]
         parts[0][rows], parts[1][rows] = scan.familiarity, scan.window
-        match = None if scan.match is None else np.zeros(n, dtype=np.int64)
-        if match is not None:
+        match = None
+        if scan.match is not None:
+            match = np.zeros(n, dtype=np.int64)
             match[rows] = scan.match
         progress: list[float | None] = [None] * n
         for row, value in zip(rows, scan.progress, strict=True):
