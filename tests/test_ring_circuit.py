@@ -177,3 +177,25 @@ def test_it_computes_what_the_anatomy_says():
         ):
             assert np.allclose(rates.ravel(), expected, atol=1e-12)
         assert circuit.steering(activity)[0] == pytest.approx(sum(cpu1[:8]) - sum(cpu1[8:]))
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.3, 1.0])
+def test_a_blend_holds_the_weighted_mean_of_two_vectors(weight):
+    activity = walked(random_ways(10, 100), 0.05)
+    other = np.random.default_rng(1).normal(0, 5, (10, 2))
+    home = QUIET.home_vector(activity)
+    blended = QUIET.blended(activity, other, weight)
+    assert np.allclose(QUIET.home_vector(blended), (1 - weight) * home + weight * other, atol=1e-9)
+    if weight == 0:
+        assert differences(blended, activity) < 1e-12
+
+
+@pytest.mark.parametrize("drift", [-0.15, 0.15])
+def test_drifting_to_a_side_turns_the_home_vector(drift):
+    headings = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    activity = QUIET.start(64)
+    for _ in range(100):
+        activity = QUIET.update(activity, headings, np.full(64, 0.5), np.full(64, drift), np.ones(64))
+    vector = QUIET.home_vector(activity) @ [1, 1j]
+    turned = np.angle(-vector * np.exp(-1j * headings))
+    assert turned.mean() == pytest.approx(np.arctan2(drift, 0.5), abs=0.05)

@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.special import expit
 
 from tussock.world.settings import instance_of, number, settings
@@ -83,6 +83,11 @@ class Activity:
 
     def __getitem__(self, rows: slice) -> "Activity":
         return Activity(tb1=self.tb1[rows], memory=self.memory[rows], cpu4=self.cpu4[rows], cpu1=self.cpu1[rows])
+
+    @property
+    def is_saturated(self) -> Bool[np.ndarray, " n"]:
+        """Whether a neuron of the memory can hold no more, so that the home vector is wrong."""
+        return np.any((self.memory <= 0) | (self.memory >= 1), axis=(1, 2))
 
     @classmethod
     def join(cls, activities: Sequence["Activity"]) -> "Activity":
@@ -192,6 +197,28 @@ class CentralComplex:
         No neuron computes it: it is for measuring.
         """
         return -self._outward(activity.memory) * self.unit / self._per_step
+
+    def blended(
+        self, activity: Activity, vector: Float[np.ndarray, "n 2"], weight: float, noise: Noise | None = None
+    ) -> Activity:
+        """The activity as if the home vector were a weighted mean of itself and another vector.
+
+        Sun, Yue and Mangan (2020) add what vision says of the way home to the same columns: a longer vector weighs more, which is the
+        best of both cues where its length says how sure it is.
+
+        Args:
+            activity: Of the agents. What their memory holds is not changed.
+            vector: (n, 2) The other vector, in the directions of the compass (m).
+            weight: Of the other vector, 0 to 1.
+            noise: (n, 90) As of the last update, for the same noise on CPU4, pontine and CPU1 neurons.
+        """
+        of = self._noise(len(activity), noise)
+        columns = -np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+        other = (vector[:, :, None] * columns).sum(axis=1) / (np.sqrt(2) * COLUMNS / 2) * self._per_step / self.unit
+        held = 0.5 + (1 - weight) * (activity.memory - 0.5) + weight * other[:, None]
+        cpu4 = self.cpu4(held, of["cpu4"].reshape(-1, 2, COLUMNS))
+        cpu1 = self._cpu1(activity.tb1, cpu4, of)
+        return Activity(tb1=activity.tb1, memory=held, cpu4=cpu4, cpu1=cpu1)
 
     def towards_end(self, activity: Activity) -> Activity:
         """The activity of an agent at its nest that remembers the end of a way, as a vector memory: it steers to there.
