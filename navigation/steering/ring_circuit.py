@@ -24,16 +24,10 @@ from tussock.world.settings import instance_of, number, settings
 
 COLUMNS = 8
 DIRECTIONS = np.arange(COLUMNS) * 2 * np.pi / COLUMNS  # rad, that the columns stand for
+_AXES = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
 _INHIBITION = (1 - np.cos(DIRECTIONS[:, None] - DIRECTIONS)) / 2  # (8, 8) of each TB1 neuron by the others
-_DRAWS = {
-    "tl2": 16,
-    "cl1": 16,
-    "tb1": 8,
-    "tn2": 2,
-    "cpu4": 16,
-    "pontine": 16,
-    "cpu1": 16,
-}  # noise, one number per neuron
+# numbers of neurons, each of which has its noise
+_DRAWS = {"tl2": 16, "cl1": 16, "tb1": 8, "tn2": 2, "cpu4": 16, "pontine": 16, "cpu1": 16}
 NOISES = sum(_DRAWS.values())
 
 Rows = Float[np.ndarray, " n"]
@@ -104,8 +98,8 @@ class CentralComplex:
     and steps of time; here its time runs with the distance: an agent always walks at the same `speed`, and `unit` says how far it
     comes in one step of time. A longer unit makes a memory that saturates later, and steers less exactly.
 
-    At the default speed, the memory of a straight way saturates after `reach` (46 m at the default unit). Beyond it, the home
-    vector is too short, and by and by its direction is wrong as well.
+    The memory of a straight way begins to saturate after `reach`: 56 m by default (46 m without noise), and in proportion to `unit`.
+    Beyond it, the home vector is too short, and its direction becomes wrong as well.
 
     Attributes:
         memory_gain: What one step of time adds to the memory, for a full input.
@@ -213,8 +207,8 @@ class CentralComplex:
             noise: (n, 90) As of the last update, for the same noise on CPU4, pontine and CPU1 neurons.
         """
         of = self._noise(len(activity), noise)
-        columns = -np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
-        other = (vector[:, :, None] * columns).sum(axis=1) / (np.sqrt(2) * COLUMNS / 2) * self._per_step / self.unit
+        scale = self._per_step / self.unit / (np.sqrt(2) * COLUMNS / 2)  # of a cosine whose vector is 1 m long
+        other = -scale * (vector[:, :, None] * _AXES).sum(axis=1)
         held = 0.5 + (1 - weight) * (activity.memory - 0.5) + weight * other[:, None]
         cpu4 = self.cpu4(held, of["cpu4"].reshape(-1, 2, COLUMNS))
         cpu1 = self._cpu1(activity.tb1, cpu4, of)
@@ -232,7 +226,7 @@ class CentralComplex:
 
     @property
     def reach(self) -> float:
-        """Length of a straight way after which the first neuron of the memory saturates, without noise (m)."""
+        """Length of a straight way after which the first neuron of the memory saturates (m)."""
         rate = np.abs(self._one_step(np.zeros(1))).max()
         return float(0.5 / rate * self.unit)
 
@@ -240,9 +234,8 @@ class CentralComplex:
         """Rates (n, 8) of TB1, from those before and the heading, by way of TL2 and CL1, two neurons for each column."""
         tuned = np.tile(np.cos(heading[:, None] - DIRECTIONS), 2)
         cl1 = self.cl1(-self.tl2(tuned, of["tl2"]), of["cl1"])
-        inhibition = (tb1[:, None] * _INHIBITION).sum(
-            axis=2
-        )  # not a matrix product: a batch must give what singles give
+        # no matrix product, whose last bits depend on the number of rows: a batch must give what singles give
+        inhibition = (tb1[:, None] * _INHIBITION).sum(axis=2)
         excitation = cl1[:, :COLUMNS] + cl1[:, COLUMNS:]
         return self.tb1(self.compass_share * excitation - (1 - self.compass_share) * inhibition, of["tb1"])
 
@@ -257,7 +250,7 @@ class CentralComplex:
         """The vector (n, 2) that a memory holds, from the nest, in its own unit. Each side holds the way along its axis of flow."""
         sides = np.stack([np.roll(memory[:, 0], 1, axis=1), np.roll(memory[:, 1], -1, axis=1)], axis=1)
         columns = sides.sum(axis=1)
-        return np.stack([columns @ np.cos(DIRECTIONS), columns @ np.sin(DIRECTIONS)], axis=1)
+        return np.stack([(columns * axis).sum(axis=1) for axis in _AXES], axis=1)
 
     @cached_property
     def _per_step(self) -> float:
