@@ -13,7 +13,8 @@ from .body import Body
 from .models.files import TrainedModel
 from .steering.scan import Scan
 from .stopping import StoppingRules
-from .walk import Step, Walk
+from .walk import Walk
+from .walker import Step
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,19 @@
-"""The body that carries the eye: how far it steps, and how well it turns."""
+"""The body that carries the eye: how far it steps, how well it turns, what stops it, and what it senses beside views."""
 
-from tussock.world.settings import number, settings
+from typing import Any
+
+from tussock.world.settings import choice, converted, number, settings
+from tussock.world.specs import Spec
+
+from .senses import SENSES
+
+COLLISIONS = ("pass", "stop", "slide")
+
+
+def _senses(value: Any) -> Spec:
+    spec = SENSES.spec(value) if isinstance(value, str) else value if isinstance(value, Spec) else SENSES.spec_of(value)
+    spec.make()  # refuses bad parameters
+    return spec
 
 
 @settings
@@ -10,7 +23,13 @@ class Body:
     Attributes:
         step_length: Length of a whole step (m), measured over the x-y plane, also where the ground slopes.
         heading_noise: Standard deviation of the normal noise on every turn (rad).
+        collisions: What plants and stones do to a step: it may "pass" through them, "stop" where the body touches one, or "slide" along it.
+        radius: Of the body, seen from above (m).
+        senses: How well it measures its heading and the distance that it walks: a spec, such as "ant" (see senses.py).
     """
 
     step_length: float = number(0.05, low=1e-6, unit="m")
     heading_noise: float = number(0.0, low=0, unit="rad")
+    collisions: str = choice("pass", COLLISIONS)
+    radius: float = number(0.005, low=0, high=1, unit="m")
+    senses: Spec = converted(default="ideal", converter=_senses)

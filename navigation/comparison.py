@@ -17,7 +17,7 @@ from .models.base import memory_bytes
 from .stopping import StopReason
 from .tested_poses import route_views_of
 from .training import training_views
-from .walk import check_inside
+from .walker import check_inside
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ settings that it consists of, and nowhere else. Importing this module is light: 
 """
 
 import logging
+import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,13 +17,15 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from tussock.world.errors import FileError, SettingError
+from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 from tussock.world.settings import converted, instance_of, number, settings
 from tussock.world.specs import Spec, takes
 
 from .body import Body
 from .devices import check_device, chosen_device
+from .displacement import Displacement
+from .experiment_fields import as_encoding, as_model, as_navigator
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -39,51 +42,10 @@ if TYPE_CHECKING:
     from .models.files import TrainedModel
     from .training import TrainingViews
     from .trajectory import Trajectory
-    from .walk import Step, Walk
+    from .walk import Walk
+    from .walker import Step
 
 log = logging.getLogger(__name__)
-MODEL_SUFFIX = ".safetensors"  # of files of trained models
-
-
-def _encoding(value: Any, experiment: Any = None) -> Any:
-    """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
-    from .encoding import PRESETS, Encoding, automatic_resize
-
-    if isinstance(value, Encoding):
-        return value
-    if not isinstance(value, str):
-        raise SettingError(f"encoding is {value!r}; give a preset's name, a chain or an Encoding")
-    return Encoding.named(value, resize=automatic_resize(experiment.eye) if value in PRESETS else 1.0)
-
-
-def _model(value: Any) -> Any:
-    """A model from its spec, its file or an untrained one."""
-    if isinstance(value, Path) or (isinstance(value, str) and value.endswith(MODEL_SUFFIX)):
-        if not Path(value).is_file():
-            raise FileError(f"there is no model file {value}; check the name")
-        return Path(value)
-    if isinstance(value, Spec):
-        return value
-    from .models import MODELS, model_spec
-    from .models.base import Model
-    from .models.opponents import Opponent
-
-    if isinstance(value, Model) and (value.shape is not None or value.seed or value.device != "cpu"):
-        raise SettingError(
-            f"{value!r} has learned, or has a seed or device; give an untrained model, and seed and device to the experiment"
-        )
-    return model_spec(str(value)) if isinstance(value, str | Opponent) else MODELS.spec_of(value)
-
-
-def _navigator(value: Any) -> Any:
-    """A navigator from its spec."""
-    from .steering import NAVIGATORS
-
-    if isinstance(value, str):
-        return NAVIGATORS.spec(value)
-    if isinstance(value, Spec | type):
-        return value if isinstance(value, Spec) else NAVIGATORS.spec_of(value)
-    raise SettingError(f"navigator is {value!r}; give a spec, such as 'scan', or a class")
 
 
 @settings
@@ -97,16 +59,22 @@ class Experiment(Surroundings):
         training: Which views are learned. A model from a file has learned already.
         body: How the agent moves.
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
+        release: The walk starts this far from the route's end instead (m), facing it. 0: at the route's start.
+        release_direction: In which direction of the world from there (rad, counter-clockwise from east).
+        displacement: Where the agent is carried to the side of the route.
         stopping: When the walk ends.
         device: Where the model learns and scans: "cpu", "cuda", another device of torch, or "auto": a GPU, if any.
     """
 
-    encoding: "Encoding" = converted(default="edges", converter=_encoding, takes_self=True)
-    navigator: Spec = converted(default="scan", converter=_navigator)
-    model: Spec | Path = converted(default="perfect-memory", converter=_model)
+    encoding: "Encoding" = converted(default="edges", converter=as_encoding, takes_self=True)
+    navigator: Spec = converted(default="scan", converter=as_navigator)
+    model: Spec | Path = converted(default="perfect-memory", converter=as_model)
     training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
     start_offset: float = number(0.0, unit="m")
+    release: float = number(0.0, low=0, unit="m")
+    release_direction: float = number(0.0, unit="rad")
+    displacement: Displacement = instance_of(Displacement, attrs.Factory(Displacement), "a Displacement")
     stopping: StoppingRules = instance_of(StoppingRules, attrs.Factory(StoppingRules), "StoppingRules")
     device: str = attrs.field(default="cpu", converter=chosen_device)
 
@@ -118,7 +86,7 @@ class Experiment(Surroundings):
         check_device(self.device)
         if self.route_database is not None and self.training.is_of_worlds:
             raise SettingError(
-                "--spacing-m and --parallel-views are of worlds; an image database has its views: give --every instead"
+                "--spacing-m, --parallel-views and --goal-walk-m are of worlds; an image database has its views: give --every instead"
             )
         if isinstance(self.model, Spec):
             model = self.make_model()  # refuses bad parameters
@@ -160,6 +128,11 @@ class Experiment(Surroundings):
 
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
+        from tussock.world.geometry import Pose
+
+        if self.release:
+            towards = Pose(route.goal.x, route.goal.y, self.release_direction + math.pi)
+            return towards.moved(-self.release).rounded()
         return route.start.moved(0.0, self.start_offset).rounded()
 
     def train(
@@ -246,7 +219,7 @@ class Experiment(Surroundings):
     @contextmanager
     def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
         """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
-        from .walk import check_inside
+        from .walker import check_inside
 
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
@@ -285,6 +258,7 @@ def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Rou
         starts=[each.start(route) for each in experiments],
         body=[each.body for each in experiments],
         stopping=[each.stopping for each in experiments],
+        displacement=[each.displacement for each in experiments],
         noise=[default_rng(each.seed) for each in experiments],
     )
 

@@ -21,7 +21,9 @@ from tussock.world.meshes.reading import MeshReading
 
 from .body import Body
 from .content import label_of
-from .experiment import MODEL_SUFFIX, Experiment
+from .displacement import Displacement
+from .experiment import Experiment
+from .experiment_fields import MODEL_SUFFIX
 from .settings_table import FIELDS, TYPES, as_field, as_setting, fields_of, read_settings
 from .stopping import StoppingRules
 from .surroundings import OF_WORLDS, Surroundings
@@ -56,6 +58,7 @@ def experiment_of(settings: Mapping[str, Any], models: "dict[Path, TrainedModel]
         navigator=_navigator(given),
         training=TrainingSetup(**fields_of(given, "training")),
         body=Body(**fields_of(given, "body")),
+        displacement=Displacement(**fields_of(given, "displacement")),
         stopping=StoppingRules(**fields_of(given, "stopping"), **_put_back(given)),
     )
 

@@ -23,7 +23,7 @@ from .learned_views import Images, LearnedViews
 from .models.base import recognises
 from .models.files import TrainedModel
 from .training import AHEAD, training_views
-from .walk import Step
+from .walker import Step
 
 
 class Cause(StrEnum):

@@ -14,6 +14,7 @@ CLASSES = {  # by the fields of `Experiment` that hold them
     "eye": ("Eye",),
     "training": ("TrainingSetup",),
     "body": ("Body",),
+    "displacement": ("Displacement",),
     "stopping": ("StoppingRules",),
 }
 OWNERS = {*itertools.chain(*CLASSES.values()), "Scan", "Camera", "Ring", "ImportSettings"}

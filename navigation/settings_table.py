@@ -6,6 +6,8 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from tussock.world.specs import Spec
+
 # Type of each setting, in the order of a table's columns, and the field of `Experiment` that it is: of itself, or, after a point, of
 # one of its settings. Settings without a field are those that need more than that. To add one: a field of `Experiment` or of the
 # settings that it consists of; a line here (and in WALK_SETTINGS of experiment_keys.py if it changes only the walk); and a flag of
@@ -42,12 +44,23 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "every": (int, "training.every"),
     "learning_walk_m": (float, "training.learning_walk"),
     "parallel_views": (int, "training.parallel_views"),
+    "goal_walk_m": (float, "training.goal_walk"),
+    "goal_views": (int, "training.goal_views"),
+    "goal_spread_deg": (float, "training.goal_spread"),
+    "goal_only": (bool, "training.goal_only"),
     "device": (str, "device"),
     "model": (str, "model"),
     "threads": (int | None, "threads"),
     "step_m": (float, "body.step_length"),
     "offset_m": (float, "start_offset"),
     "heading_noise_deg": (float, "body.heading_noise"),
+    "collisions": (str, "body.collisions"),
+    "body_radius_m": (float, "body.radius"),
+    "senses": (str, "body.senses"),
+    "release_m": (float, "release"),
+    "release_deg": (float, "release_direction"),
+    "displace_at": (float, "displacement.at"),
+    "displace_m": (float, "displacement.left"),
     "scan_deg": (float | None, ""),
     "scan_about_deg": (float | None, ""),
     "on_lost": (str, ""),
@@ -82,8 +95,8 @@ def as_field(name: str, value: Any) -> Any:
 
 
 def as_setting(name: str, value: Any) -> Any:
-    """A field as a setting of this name: an angle in degrees, a path as text."""
-    if isinstance(value, Path):
+    """A field as a setting of this name: an angle in degrees, a path or a spec as text."""
+    if isinstance(value, Path | Spec):
         return str(value)
     return degrees(value) if name.endswith("_deg") and value is not None else value
 

@@ -8,79 +8,24 @@ The walk knows where its agents are, and so measures how far off the route they 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import torch
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import UInt8
 
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
+from tussock.world.collisions import slid, stopped
 from tussock.world.errors import SettingError
-from tussock.world.geometry import Pose, Route, place_text, wrap_angle
-from tussock.world.scene import World
-from tussock.world.terrain import Terrain
+from tussock.world.geometry import Pose, Route
 
 from .body import Body
+from .displacement import Displacement
 from .encoding import Encoding
-from .steering.navigator import Images, Look, Motion, Navigator, check_motion
-from .stop_check import StopCheck
+from .steering.navigator import Images, Look, Motion, Navigator, PathIntegrating, check_motion
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread
-
-RECOVERABLE = (
-    StopReason.LOST,
-    StopReason.STUCK,
-    StopReason.OUT_OF_WORLD,
-    StopReason.OFF_GROUND,
-    StopReason.TOO_STEEP,
-    StopReason.OFF_GRID,
-)  # from where an agent can be put back on the route
-
-
-@dataclass(frozen=True, kw_only=True)
-class Step:
-    """One look of an agent, and what it did then.
-
-    Attributes:
-        index: 0 for the first look.
-        pose: Where the agent stands and faces as it looks.
-        height: Of the ground beneath it (m).
-        view: (height, width, 4) What it sees, RGBA (RGB where it comes from images without alpha); None where it was not drawn.
-        encoded: (h, w) The feature image that the navigator gets of it; None likewise.
-        familiarity: (w,) Of every rotation, turned left by 0, 1, .. columns; None where the navigator does not scan.
-        scanned: (w,) Which of these rotations the navigator compared; None likewise.
-        aim: Turn that the navigator decided on (rad, left positive).
-        turn: Turn that the body made: the aim and noise (rad), to a heading that is a multiple of 0.01 degrees.
-        match: Index of the learned view that was recognised; None where the model keeps none.
-        progress: Share of the learned sequence, 0 to 1, that the navigator believes to have walked; None where it does not know.
-        view_distance: Distance from the entry of the image database whose view it sees (m); None in a world.
-        deviation: Distance from the route (m).
-        along: Distance along the route of the point nearest to the agent (m).
-        error: Angle from the route's heading there to the agent's new heading (rad, -pi..pi).
-        reason: Why the walk ends here; None while it goes on.
-        reset: Why the agent was put back on the route before this look; None where it was not.
-        failure: Why it fails here, whether the walk ends or the agent is put back after this look; None where it does not fail.
-    """
-
-    index: int
-    pose: Pose
-    height: float
-    view: UInt8[np.ndarray, "height width channels"] | None
-    encoded: Float32[torch.Tensor, "h w"] | None
-    familiarity: Float32[np.ndarray, " w"] | None
-    scanned: Bool[np.ndarray, " w"] | None
-    aim: float
-    turn: float
-    match: int | None
-    progress: float | None
-    view_distance: float | None
-    deviation: float
-    along: float
-    error: float
-    reason: StopReason | None
-    reset: StopReason | None
-    failure: StopReason | None
+from .walker import Step, Walker
 
 
 class Walk:
@@ -99,6 +44,7 @@ class Walk:
         starts: Sequence[Pose],
         body: Body | Sequence[Body] | None = None,
         stopping: StoppingRules | Sequence[StoppingRules] | None = None,
+        displacement: Displacement | Sequence[Displacement] | None = None,
         noise: int | Sequence[np.random.Generator] = 0,
     ):
         """Put agents at the start of a walk.
@@ -110,6 +56,7 @@ class Walk:
             starts: Where each of them begins.
             body: How they move: all of them, or one for each.
             stopping: When their walks end: likewise.
+            displacement: Where they are carried to the side: likewise.
             noise: What the noise on the turns is drawn from: a generator for each agent, or a seed (agent k takes seed + k).
 
         Raises:
@@ -117,14 +64,13 @@ class Walk:
         """
         self.renderer, self.encoding, self.route = renderer, encoding.for_eye(renderer.eye), route
         self.world = renderer.world
-        bodies = body if isinstance(body, Sequence) else [body or Body()] * len(starts)
-        rules = stopping if isinstance(stopping, Sequence) else [stopping or StoppingRules()] * len(starts)
+        count = len(starts)
+        bodies, rules = _each(body or Body(), count), _each(stopping or StoppingRules(), count)
+        carried = _each(displacement or Displacement(), count)
         generators = (
-            [np.random.default_rng(noise + k) for k in range(len(starts))]
-            if isinstance(noise, int | np.integer)
-            else noise
+            [np.random.default_rng(noise + k) for k in range(count)] if isinstance(noise, int | np.integer) else noise
         )
-        each = zip(range(len(starts)), starts, bodies, rules, generators, strict=True)
+        each = zip(range(count), starts, bodies, rules, carried, generators, strict=True)
         self.agents = [Walker(self, *of_agent) for of_agent in each]
         self.reach = renderer.reach if isinstance(renderer, DatabaseViews) else np.inf
         self._seen: tuple[UInt8[np.ndarray, "n height width channels"], Images] | None = None  # views, and as encoded
@@ -135,13 +81,16 @@ class Walk:
             )
 
     @property
-    def walking(self) -> list["Walker"]:
+    def walking(self) -> list[Walker]:
         """The agents whose walk goes on."""
         return [agent for agent in self.agents if not agent.ended]
 
     def steps(self, navigator: Navigator) -> Iterator[list[Step | None]]:
         """Walk until all have arrived or failed. Each time, a list with the `Step` of each agent, or None if its walk has ended."""
         memories = [navigator.begin() for _ in self.agents]
+        if isinstance(navigator, PathIntegrating):
+            for agent, memory in zip(self.agents, memories, strict=True):
+                navigator.travel(memory, agent.way_out())
         while walking := self.walking:
             for agent in walking:
                 memory = memories[agent.number]
@@ -155,11 +104,18 @@ class Walk:
 
     def look(self) -> Look:
         """What the agents whose walk goes on perceive."""
-        poses = np.array([agent.pose for agent in self.walking])
+        walking = self.walking
+        poses = np.array([agent.pose for agent in walking])
         views = self.renderer.render(poses)
         known = self.renderer.known(poses) if isinstance(self.renderer, DatabaseViews) else None
         self._seen = views, self.encoding(views, known)
-        return Look(views=self._seen[1], compass=poses[:, 2])
+        compass, odometry = np.array([agent.sense() for agent in walking]).T
+        return Look(
+            views=self._seen[1],
+            compass=compass,
+            odometry=odometry,
+            touch=np.array([agent.touched for agent in walking]),
+        )
 
     def move(self, motion: Motion) -> list[Step | None]:
         """Let the agents whose walk goes on move, and measure where they come to; a row of the motion for each of them."""
@@ -169,118 +125,45 @@ class Walk:
             seen = (None, None) if self._seen is None else (self._seen[0][row], self._seen[1][row])
             steps[agent.number] = agent.step(motion, row, *seen)
         self._seen = None
+        self._collide([agent for agent in walking if agent.walked and agent.body.collisions != "pass"])
         self._measure([agent for agent in walking if not agent.ended])
         return steps
 
-    def _measure(self, agents: Sequence["Walker"]) -> None:
+    def _measure(self, agents: Sequence[Walker]) -> None:
         """Find where agents have come to, and whether their walks end there."""
         if agents:
             heights = self.world.ground_height(np.array([agent.pose[:2] for agent in agents]))
             for agent, height in zip(agents, heights.tolist(), strict=True):
                 agent.tread(height)
             deviation, along = self.route.nearest(np.array([agent.pose[:2] for agent in agents]))
-            headings = self.route.at(along)[:, 2]
-            for agent, *measured in zip(agents, deviation.tolist(), along.tolist(), headings.tolist(), strict=True):
+            nearest = [Pose(*pose) for pose in self.route.at(along).tolist()]
+            for agent, far, distance, pose in zip(agents, deviation.tolist(), along.tolist(), nearest, strict=True):
                 if isinstance(self.renderer, DatabaseViews):
                     agent.view_distance = float(self.renderer.nearest([agent.pose])[1][0])
-                agent.measure(*measured)
+                agent.measure(far, distance, pose)
+            self._measure([agent for agent in agents if agent.carry()])
+
+    def _collide(self, agents: Sequence[Walker]) -> None:
+        """Let obstacles stop the steps that agents have just made, or turn them aside."""
+        for collisions, move in (("stop", stopped), ("slide", slid)):
+            those = [agent for agent in agents if agent.body.collisions == collisions]
+            if not those:
+                continue
+            starts, ends = (
+                np.array([pose[:2] for pose in poses]) for poses in zip(*map(_last_step, those), strict=True)
+            )
+            contact = move(self.world, starts, ends, np.array([agent.body.radius for agent in those]))
+            for agent, (x, y), touched in zip(those, contact.positions.tolist(), contact.touched.tolist(), strict=True):
+                if touched:
+                    agent.block(x, y)
 
 
-class Walker:
-    """Where one agent of a walk is, and what it has done so far."""
-
-    def __init__(
-        self, walk: Walk, number: int, start: Pose, body: Body, stopping: StoppingRules, random: np.random.Generator
-    ):
-        check_inside(start, walk.world)
-        self.walk, self.number, self.body, self.stopping, self.random = walk, number, body, stopping, random
-        self.pose = Pose(start.x, start.y, float(wrap_angle(start.heading)))
-        self.step_limit = stopping.step_limit(walk.route.length, body.step_length)
-        self.stop_check = StopCheck(stopping, walk.route, walk.world.field, body.step_length)
-        self.index, self.ended = 0, False
-        self.reset: StopReason | None = None
-        self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
-        self.trodden: tuple[Pose, float] | None = (
-            None  # where it stood before its step, and how high; None after being put back
-        )
-        self.stopped: StopReason | None = None  # by the ground
-
-    def tread(self, height: float) -> None:
-        """Take in the height of the ground at its pose (m). It does not make a step that the ground does not allow."""
-        terrain = self.walk.world.terrain
-        self.stopped = None
-        if terrain is not None and self.trodden is not None:
-            before, height_before = self.trodden
-            self.stopped = self._obstacle(terrain, before, height - height_before)
-            if self.stopped is not None:
-                self.pose, height = Pose(before.x, before.y, self.pose.heading), height_before
-        self.height = height
-
-    def _obstacle(self, terrain: Terrain, before: Pose, rise: float) -> StopReason | None:
-        """Why the step from a pose to the present one, which rises by some metres, cannot be made; None where it can."""
-        x, y, _ = self.pose
-        if not self.walk.world.field.contains(x, y):
-            return StopReason.OUT_OF_WORLD
-        if np.isnan(rise):
-            return StopReason.TOO_STEEP if terrain.is_steep(x, y) else StopReason.OFF_GROUND
-        return StopReason.TOO_STEEP if terrain.is_too_steep(np.hypot(x - before.x, y - before.y), rise) else None
-
-    def measure(self, deviation: float, along: float, route_heading: float) -> None:
-        """Take in how far it is from the route (m) and along it (m), and the route's heading there (rad)."""
-        self.deviation, self.along, self.route_heading = deviation, along, route_heading
-        self.reason = self.stop_check.check(self.pose, deviation, along) or self.stopped
-        if self.reason is not StopReason.ARRIVED and (self.view_distance or 0.0) > self.walk.reach:
-            self.reason = StopReason.OFF_GRID
-        if self.reason is None and self.index >= self.step_limit:
-            self.reason = StopReason.OUT_OF_STEPS
-
-    def step(self, motion: Motion, row: int, view: np.ndarray | None, encoded: torch.Tensor | None) -> Step:
-        """Do as a row of a motion says."""
-        stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
-        aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
-        noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
-        facing = pose.turned(aim + noise).rounded()
-        turn = float(wrap_angle(facing.heading - pose.heading))
-        put_back = stopping.put_back and self.reason in RECOVERABLE and self.index < self.step_limit
-        step = Step(
-            index=self.index,
-            pose=pose,
-            height=self.height,
-            view=view,
-            encoded=encoded,
-            familiarity=None if scan is None else scan.familiarity[row],
-            scanned=None if scan is None else scan.window[row],
-            aim=aim,
-            turn=turn,
-            match=None if scan is None or scan.match is None else int(scan.match[row]),
-            progress=None if scan is None else scan.progress[row],
-            view_distance=self.view_distance,
-            deviation=self.deviation,
-            along=self.along,
-            error=float(wrap_angle(facing.heading - self.route_heading)),
-            reason=None if put_back else self.reason,
-            reset=self.reset,
-            failure=None if self.reason is StopReason.ARRIVED else self.reason,
-        )
-        self.reset = self.reason if put_back else None
-        self.ended = step.reason is not None
-        self.trodden = None if put_back else (pose, self.height)
-        if put_back:
-            self.pose = self.stop_check.put_back()
-        elif not self.ended:
-            self.pose = facing.moved(share * body.step_length).rounded()
-            self.stop_check.walked(share)
-        self.index += 1
-        return step
+def _last_step(agent: Walker) -> tuple[Pose, Pose]:
+    """Where an agent stood before its step, and where it stands now."""
+    assert agent.trodden is not None
+    return agent.trodden[0], agent.pose
 
 
-def check_inside(pose: Pose, world: World) -> None:
-    """Refuse a start that is outside of the world, or off its ground. Raises SettingError."""
-    if not np.isfinite(pose).all() or not world.field.contains(pose.x, pose.y):
-        raise SettingError(
-            f"the start {place_text(pose.x, pose.y)} is outside the world ({world.field}); choose another route or offset"
-        )
-    if world.terrain is not None and not world.stands(np.array([pose[:2]]))[0]:
-        raise SettingError(
-            f"a walk cannot start there: {world.terrain.problem(pose.x, pose.y)}; choose another route or offset"
-        )
+def _each(setting: Any, count: int) -> Sequence[Any]:
+    """A setting of each of some agents, from one that all share or from those of each."""
+    return setting if isinstance(setting, Sequence) else [setting] * count

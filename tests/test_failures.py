@@ -27,7 +27,7 @@ from tussock.navigation.recording.log import Recording
 from tussock.navigation.stopping import StoppingRules, StopReason
 from tussock.navigation.training import train, training_views
 from tussock.navigation.trajectory import COLUMNS, Trajectory
-from tussock.navigation.walk import Step
+from tussock.navigation.walker import Step
 from tussock.render.eye import Eye
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import open_renderer

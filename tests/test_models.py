@@ -12,7 +12,7 @@ from small_models import small
 
 from tussock.navigation.feature_mask import FeatureMask
 from tussock.navigation.models import MODELS, OPPONENT, make_model
-from tussock.navigation.models.base import FamiliarityModel, Model, memory_bytes
+from tussock.navigation.models.base import FamiliarityModel, Model, memory_bytes, score
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.models.incremental import IncrementalModel
 from tussock.navigation.scan import scan_window
@@ -154,8 +154,46 @@ def test_views_are_scanned_together_as_each_alone(name, trained):
     assert wrong.float().mean() <= (0.01 if base(name) in THRESHOLDS else 0)
 
 
-def test_score_is_the_familiarity_at_the_present_heading(name, trained):
-    assert torch.equal(trained.score(views(3, 1)), trained.scan(views(3, 1))[:, 0])
+VISIBLE = torch.arange(24).expand(5, 24) + torch.arange(5)[:, None] > 8
+MASKS = {"all": None, "part": FeatureMask(VISIBLE), "normalised": FeatureMask(VISIBLE, normalised=True, gain=0.5)}
+
+
+@pytest.mark.parametrize("mask", MASKS)
+@pytest.mark.parametrize("seed", range(3))
+def test_score_is_the_familiarity_at_the_present_heading(name, mask, seed):
+    model = small(name, seed=seed).see(MASKS[mask]).fit(views(12, seed))
+    queries = torch.cat([views(40, seed + 10), views(12, seed)])
+    scores, scanned = model.score(queries), model.scan(queries)[:, 0]
+    assert scores.dtype == torch.float32
+    assert scores.shape == (52,)
+    wrong = (scores - scanned).abs() > 1e-5 * scanned.abs().max()
+    assert wrong.float().mean() <= (0.02 if base(name) in THRESHOLDS else 0)
+    assert torch.equal(scores, torch.cat([model.score(view[None]) for view in queries]))
+
+
+@pytest.mark.parametrize("name", ["perfect-memory", "visual-compass"])
+def test_score_of_views_that_are_known_in_part_is_that_of_the_scan(name):
+    model = make_model(name).see(FeatureMask(torch.ones(5, 24, dtype=torch.bool), partial=True))
+    route = views(12)
+    route[:, :, 20:] = torch.nan
+    model.fit(route)
+    assert torch.equal(model.score(route), model.scan(route)[:, 0])
+
+
+@pytest.mark.parametrize("name", ["perfect-memory", "chain", "window-memory"])
+def test_score_of_encoded_views_is_exact(name):
+    whole = np.random.default_rng(0).integers(-5 * 4096, 5 * 4096, size=(60, 5, 24))
+    encoded = torch.from_numpy(whole / 4096).float()
+    squared = ((whole[:20, None] - whole[None, 20:]) ** 2).sum(axis=(2, 3)).min(axis=1)
+    expected = -np.sqrt(squared / 4096**2 / (5 * 24)).astype(np.float32)
+    assert make_model(name).fit(encoded[20:]).score(encoded[:20]).numpy().tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("smoothing_deg", [0.0, 1.0, 6.0, 180.0])
+def test_score_of_a_mushroom_body_averages_as_its_scan(smoothing_deg):
+    model = small("mushroom-body", smoothing_deg=smoothing_deg).fit(views(12, w=72))
+    wrong = (model.score(views(40, 1, w=72)) - model.scan(views(40, 1, w=72))[:, 0]).abs() > 1e-6
+    assert wrong.float().mean() <= 0.05  # where drives tie, either cell may fire
 
 
 def test_the_same_seed_learns_the_same_bytes(name):
@@ -344,6 +382,7 @@ def test_training_leaves_the_given_views_unchanged_and_keeps_none_of_them(name, 
 def test_one_view_no_view_and_a_constant_view(name):
     model = small(name).fit(views(1))
     assert model.scan(views(0)).shape == (0, 24)
+    assert model.score(views(0)).shape == (0,)
     assert torch.isfinite(model.scan(torch.zeros(1, 5, 24))).all()
     for level in (0.0, 0.7):
         model = small(name).fit(torch.full((2, 5, 24), level))
@@ -376,8 +415,20 @@ def test_views_that_cannot_be_learned_or_scanned_are_refused(name):
         model.scan(broken)
     with pytest.raises(SettingError, match=r"shape \(5, 24\), got \(5, 25\)"):
         model.scan(views(1, w=25))
+    with pytest.raises(SettingError, match=r"view 1 .* not finite"):
+        model.score(broken)
+    with pytest.raises(SettingError, match="learned nothing"):
+        small(name).score(views(1))
     with pytest.raises(REFUSED):
         model.scan(views(1)[0])
+
+
+def test_a_score_beyond_float32_is_refused():
+    model = small("mlp").fit(views(3))
+    model.restore((5, 24), {key: 1e12 * tensor for key, tensor in model.learned.items()})
+    for familiarity in (model.scan, model.score):
+        with pytest.raises(SettingError, match="beyond float32"):
+            familiarity(1e11 * views(1))
 
 
 @pytest.mark.parametrize("device", ["cuda:99", "nonsense", ""])
@@ -483,6 +534,16 @@ def test_a_model_from_outside_needs_only_fit_and_scan():
         each.fit(views(5))
     away = Outside(gain=2).fit(views(5).roll(12, dims=-1))
     assert torch.equal(opposed.scan(views(3, 1)), model.scan(views(3, 1)) - away.scan(views(3, 1)))
+
+
+def test_any_model_scores_views_by_its_own_score_or_by_its_scan(name, trained):
+    assert torch.equal(score(trained, views(3, 1)), trained.score(views(3, 1)))
+    outside = Outside().fit(views(5))
+    assert torch.equal(score(outside, views(3, 1)), outside.scan(views(3, 1))[:, 0])
+    opposed = make_model(f"{OPPONENT}{Outside.__module__}:Outside").fit(views(5))
+    assert torch.equal(score(opposed, views(3, 1)), opposed.scan(views(3, 1))[:, 0])
+    outside.score = lambda views: views[:, 0, 0]
+    assert torch.equal(score(outside, views(3, 1)), views(3, 1)[:, 0, 0])
 
 
 def test_a_class_without_scan_is_refused():

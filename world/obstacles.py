@@ -12,6 +12,7 @@ from .terrain import STEP_HEIGHT, Terrain
 BODY_HEIGHT = 0.06  # m; the insect walks under what is higher
 MIN_LEVEL = -4  # shapes within 2 ** -4 m of their middle are of one size
 SLACK = 1e-6  # m; more than the rounding of any distance
+MIN_AREA = 1e-10  # m2, twice the area of a shape; a smaller one, such as an upright blade, has no inside
 BATCH = 500  # positions at once, which bounds the memory of the shapes near them
 
 
@@ -32,9 +33,7 @@ def _clearance(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, 
         nearest = size.members[size.middles.query(xy)[1]]
         distance = np.minimum(distance, _distance_to(shapes[nearest], xy))
     for size in _by_size(world):
-        near = size.middles.query_ball_point(xy, distance + size.radius + SLACK, return_sorted=False)
-        row = np.repeat(np.arange(len(xy)), [len(each) for each in near])
-        shape = size.members[np.concatenate(near).astype(np.int64)]
+        row, shape = size.within(xy, distance)
         np.minimum.at(distance, row, _distance_to(shapes[shape], xy[row]))
     return distance
 
@@ -53,6 +52,14 @@ class _OneSize:
     middles: KDTree
     radius: float
 
+    def within(
+        self, xy: Float[np.ndarray, "n 2"], distance: Float[np.ndarray, " n"]
+    ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+        """For each position (m), all footprints within a distance (m), and some beyond: rows of `xy`, and footprints."""
+        within = self.middles.query_ball_point(xy, distance + self.radius + SLACK, return_sorted=False)
+        row = np.repeat(np.arange(len(xy)), [len(each) for each in within])
+        return row, self.members[np.concatenate([np.zeros(0), *within]).astype(np.int64)]
+
 
 @once_per_world
 def _by_size(world: World) -> list[_OneSize]:
@@ -63,6 +70,22 @@ def _by_size(world: World) -> list[_OneSize]:
     level = np.maximum(np.frexp(radius)[1], MIN_LEVEL)
     members = [np.flatnonzero(level == number) for number in np.unique(level)]
     return [_OneSize(these, KDTree(middle[these]), float(radius[these].max())) for these in members]
+
+
+def footprints_within(
+    world: World, xy: Float[np.ndarray, "n 2"], distance: Float[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    """For each position (m), all footprints within a distance (m), and some beyond.
+
+    Returns:
+        rows: (m,) Which position.
+        shapes: (m,) Which footprint. The pairs are in the order of positions, and for each in the order of footprints.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    parts = [size.within(xy, distance) for size in _by_size(world)]
+    rows, shapes = (np.concatenate([none, *each]) for each in (zip(*parts, strict=True) if parts else ((), ())))
+    order = np.lexsort((shapes, rows))
+    return rows[order], shapes[order]
 
 
 @once_per_world
@@ -109,5 +132,5 @@ def _distance_to(shapes: Float[np.ndarray, "n 6 2"], xy: Float[np.ndarray, "n 2"
     share = np.clip((side * offset).sum(axis=2) / np.where(squared > 0, squared, 1.0), 0, 1)
     distance = np.hypot(*np.moveaxis(offset - share[..., None] * side, -1, 0)).min(axis=1)
     turn = side[..., 0] * offset[..., 1] - side[..., 1] * offset[..., 0]  # twice the area of (corner, corner, point)
-    within = ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)) & (np.abs(turn.sum(axis=1)) > 1e-10)
+    within = ((turn >= 0).all(axis=1) | (turn <= 0).all(axis=1)) & (np.abs(turn.sum(axis=1)) > MIN_AREA)
     return np.where(within, 0.0, distance)

@@ -8,7 +8,8 @@ from typing import Any
 from tussock.world.errors import InputError, SettingError
 from tussock.world.progress import Progress, no_progress
 
-from ..experiment import MODEL_SUFFIX, Experiment
+from ..experiment import Experiment
+from ..experiment_fields import MODEL_SUFFIX
 from ..experiment_keys import key_of
 from ..models import model_spec
 from ..models.base import FamiliarityModel

@@ -12,7 +12,7 @@ import tyro
 
 from tussock.world.errors import FileError, SettingError
 
-from ..experiment import MODEL_SUFFIX
+from ..experiment_fields import MODEL_SUFFIX
 from .options import Command, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
 

@@ -17,6 +17,7 @@ from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
 
 from ..body import Body
+from ..displacement import Displacement
 from ..experiment import Experiment
 from ..experiment_settings import TYPES, experiment_of, surroundings_of
 from ..settings_table import degrees
@@ -184,6 +185,14 @@ class LearningOptions(SourceOptions):
     """Also learn views displaced to both sides by up to this, each facing the route a little ahead; 0 is none."""
     parallel_views: int = default(TrainingSetup, "parallel_views")
     """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
+    goal_walk_m: float = default(TrainingSetup, "goal_walk")
+    """Also learn views on a spiral about the end of the route, from 0.1 m to this far away, that face the end; 0 is none."""
+    goal_views: int = default(TrainingSetup, "goal_views")
+    """Number of views on this spiral."""
+    goal_spread_deg: float = degrees(default(TrainingSetup, "goal_spread"))
+    """These views face up to this much beside the end of the route, at random."""
+    goal_only: bool = default(TrainingSetup, "goal_only")
+    """Learn only the views of --goal-walk-m, and none along the route."""
     device: str = default(Experiment, "device")
     """Where the model learns and scans: cpu, cuda, another device of torch's, or auto: a GPU where there is one."""
 
@@ -219,6 +228,21 @@ class RunOptions(ModelOptions):
     """Start this far to the left of the route (negative: right)."""
     heading_noise_deg: float = degrees(default(Body, "heading_noise"))
     """Standard deviation of the noise on every turn."""
+    collisions: Annotated[str, tyro.conf.arg(metavar="pass|stop|slide")] = default(Body, "collisions")
+    """What plants and stones do to a step: let it pass through, stop it where the body touches one, or let it slide along."""
+    body_radius_m: float = default(Body, "radius")
+    """Radius of the body, which may not enter what it touches."""
+    senses: str = default(Body, "senses")
+    """How well the agent measures its heading and the distance it walks: ideal, robot, svo-gtsam, stankiewicz-webb, ant or bee, with their
+    published noise; parameters may follow, as in 'ant compass_deg=10 speed=0.2'."""
+    release_m: float = default(Experiment, "release")
+    """Start this far from the end of the route, facing it, in place of the start of the route; 0 is there."""
+    release_deg: float = degrees(default(Experiment, "release_direction"))
+    """Direction of the world, counter-clockwise from east, in which --release-m lies from the end of the route."""
+    displace_at: float = default(Displacement, "at")
+    """Carry the agent to the side after this share of the route; see --displace-m."""
+    displace_m: float = default(Displacement, "left")
+    """How far, to the left of the route (negative: right). 0: it is not carried."""
     scan_deg: float | None = None
     """Width of the scan. Default: 180."""
     scan_about_deg: float | None = None

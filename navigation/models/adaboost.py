@@ -11,8 +11,8 @@ from tussock.render.compile import compiled
 from tussock.world.geometry import columns_of_turn
 from tussock.world.settings import number, numbers, whole
 
-from .base import Images, Learned, Model, Scans, Shapes, model
-from .filter_bank import FilterBank
+from .base import Images, Learned, Model, Scans, Scores, Shapes, model
+from .filter_bank import responses_ahead
 from .rotations import in_batches, one_by_one
 
 NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a stump is searched
@@ -98,7 +98,8 @@ class AdaBoost(Model):
         away = torch.arange(width, device=views.device)
         wrong = torch.minimum(away, width - away) * (360 / width) >= self.tolerance_deg
         bank = self._bank(learned["filters"])
-        scan = torch.cat([sum_of_votes(bank, learned, batch) for batch in in_batches(views)]).where(wrong, -torch.inf)
+        scans = [sum_of_votes(bank.responses(batch), learned) for batch in in_batches(views)]
+        scan = torch.cat(scans).where(wrong, -torch.inf)
         turns = scan.topk(min(self.hard_negatives, int(wrong.sum())), dim=1).indices.tolist()
         return torch.stack([view.roll(k, dims=-1) for view, ks in zip(views, turns, strict=True) for k in ks])
 
@@ -109,12 +110,15 @@ class AdaBoost(Model):
         self._chosen = self._bank(self.learned["filters"])
 
     def _scan(self, views: Images) -> Scans:
-        return sum_of_votes(self._chosen, self.learned, views)
+        return sum_of_votes(self._chosen.responses(views), self.learned)
+
+    def _score(self, views: Images) -> Scores:
+        return sum_of_votes(responses_ahead(self.learned["filters"], self._seen(views)), self.learned)[:, 0]
 
 
-def sum_of_votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:
+def sum_of_votes(responses: Float32[torch.Tensor, "n w features"], learned: Learned) -> Scans:
     """Sum of the votes of all stumps at each rotation."""
-    answers = (bank.responses(views) > learned["cuts"]).float() * 2 - 1
+    answers = (responses > learned["cuts"]).float() * 2 - 1
     return one_by_one(lambda answers: answers @ learned["votes"], answers)
 
 

@@ -1,12 +1,13 @@
 """An autoencoder: views that it cannot reconstruct are unfamiliar."""
 
 import torch
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 
 from tussock.world.settings import number, whole
 
 from ..feature_mask import energies
-from .base import Images, Learned, Model, Scans, Shapes, model
+from .base import Images, Learned, Model, Scans, Scores, Shapes, model
+from .filter_bank import responses_ahead
 from .rotations import one_by_one
 
 
@@ -64,17 +65,27 @@ class Autoencoder(Model):
 
     def _prepare(self) -> None:
         weights, visible = self.learned["weights"].flatten(start_dim=1), self.learned["visible"].flatten()
-        self._responses = self._bank(torch.cat([self.learned["weights"], self.learned["visible"][None]])).responses
+        self._filters = torch.cat([self.learned["weights"], self.learned["visible"][None]])
+        self._responses = self._bank(self._filters).responses
         self._overlap, self._projection, self._energy = weights @ weights.T, weights @ visible, visible @ visible
 
     def _scan(self, views: Images) -> Scans:
-        responses = self._responses(views)  # (n, w, units + 1)
+        return self._familiarity(self._responses(views), energies(views, self.mask))
+
+    def _score(self, views: Images) -> Scores:
+        seen = self._seen(views)
+        return self._familiarity(responses_ahead(self._filters, seen), energies(seen, None))[:, 0]
+
+    def _familiarity(
+        self, responses: Float32[torch.Tensor, "n w filters"], squares: Float[torch.Tensor, "n rotations"]
+    ) -> Scans:
+        """Minus the error at some rotations, from the responses of all filters and |v|^2 of what is seen."""
         drive, bias = responses[..., :-1], responses[..., -1]
         h = torch.tanh(drive + self.learned["hidden"])
         product = (h * drive).sum(dim=2) + bias
         energy = one_by_one(self._energies, h)
-        squared = energies(views, self.mask) - 2 * product + energy
-        return -(squared.clamp(min=0) / self._size(*views.shape[1:])).sqrt().float()
+        squared = squares - 2 * product + energy
+        return -(squared.clamp(min=0) / self._size(*self._filters.shape[1:])).sqrt().float()
 
     def _energies(self, h: Float32[torch.Tensor, "w units"]) -> Float32[torch.Tensor, " w"]:
         """|r|^2 of the reconstructions."""

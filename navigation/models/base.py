@@ -2,7 +2,7 @@
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol, TypeVar, dataclass_transform, runtime_checkable
 
 import attrs
@@ -16,12 +16,13 @@ from tussock.world.specs import format_spec, own_parameters
 
 from ..devices import check_device
 from ..feature_mask import WITH_MASK, FeatureMask, check_takes_partial, is_partial
-from .checks import MAX_COLUMNS, MAX_VALUE, Images, all_bounded, check_scan, check_training
+from .checks import MAX_COLUMNS, Images, check_bounded, check_familiarity, check_form, check_scan, check_training
 from .filter_bank import FilterBank
 from .registry import MODELS
 from .rotations import in_batches
 
 Scans = Float32[torch.Tensor, "n w"]
+Scores = Float32[torch.Tensor, " n"]
 Windows = Bool[np.ndarray, "n w"]  # the rotations of each view that a scan chooses from
 Learned = dict[str, torch.Tensor]
 Shapes = dict[str, tuple[int | None, ...]]
@@ -34,7 +35,7 @@ class FamiliarityModel(Protocol):
     """Learns the views of a route and scores other views by how familiar they are at every rotation.
 
     Views are feature images (n, h, w) as an `Encoding` makes them; for training they face along the route. Views of several routes
-    are learned one route after the other. A model may also have `memory_bytes`; see the function of this name.
+    are learned one route after the other. A model may also have `memory_bytes` and `score`; see the functions of these names.
     """
 
     def fit(self, views: Images) -> Any:
@@ -92,6 +93,12 @@ def memory_bytes(model: FamiliarityModel) -> int | None:
     size = getattr(model, "memory_bytes", None)
     size = size() if callable(size) else size
     return None if size is None else int(size)
+
+
+def score(model: FamiliarityModel, views: Images) -> Scores:
+    """Familiarity of each view at its present heading, on the CPU: by `score(views)` of the model where it has one, else by its scan."""
+    score = getattr(model, "score", None)
+    return (model.scan(views)[:, 0] if score is None else score(views)).cpu()
 
 
 def recognises(model: FamiliarityModel) -> bool:
@@ -183,18 +190,12 @@ class Model(ABC):
             SettingError: Before `fit`, and for views of another shape than the learned ones.
         """
         check_scan(views, self.shape, is_partial(self.mask))
-        if len(views) == 0:
-            return torch.empty(0, views.shape[2])
-        scans = torch.cat([self._scan(self._on_device(batch)) for batch in in_batches(views)])
-        if not torch.isfinite(scans).all():
-            raise SettingError(
-                f"{self.name}: familiarity is beyond float32 (did training end with large weights?); scale the views"
-            )
-        return scans
+        return torch.empty(0, views.shape[2]) if len(views) == 0 else self._batched(self._scan, views)
 
-    def score(self, views: Images) -> Float32[torch.Tensor, " n"]:
-        """Familiarity of each view at its present heading."""
-        return self.scan(views)[:, 0]
+    def score(self, views: Images) -> Scores:
+        """Familiarity of each view at its present heading: `scan(views)[:, 0]` but for rounding, at less cost. Refuses what `scan` does."""
+        check_scan(views, self.shape, is_partial(self.mask))
+        return torch.empty(0) if len(views) == 0 else self._batched(self._score, views)
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
         """Take over what was learned, by training or from a file; where that fails, the model stays as it was.
@@ -231,11 +232,7 @@ class Model(ABC):
     def check_learned(self, shape: tuple[int, int], learned: Learned) -> None:
         """Refuse what a model with these parameters cannot have learned from views of a shape. Raises SettingError."""
         self._check_form(shape, learned)
-        for key, tensor in learned.items():
-            if tensor.is_floating_point() and not all_bounded(tensor, is_partial(self.mask)):
-                raise SettingError(
-                    f"{self.name}: the {key} are not finite, or over {MAX_VALUE:g}; if they grew without bound, give a lower rate"
-                )
+        check_bounded(self.name, learned, is_partial(self.mask))
 
     def _check_form(self, shape: tuple[int, int], learned: Learned) -> None:
         """Refuse tensors of other names, shapes and types."""
@@ -243,17 +240,13 @@ class Model(ABC):
             self.mask.check(shape)
         if shape[1] > MAX_COLUMNS:
             raise SettingError(f"{self.name}: views of {shape[1]} columns; give at most {MAX_COLUMNS}")
-        expected = self._shapes(*shape)
-        if learned.keys() != expected.keys():
-            raise SettingError(f"{self.name}: it learns {', '.join(expected)}, not {', '.join(learned) or 'nothing'}")
-        for key, tensor in learned.items():
-            fits = tensor.ndim == len(expected[key]) and all(
-                want in (None, size) and size > 0 for want, size in zip(expected[key], tensor.shape, strict=True)
-            )
-            if not fits:
-                raise SettingError(f"{self.name}: {key} has shape {tuple(tensor.shape)}, not {expected[key]}")
-            if (dtype := self.dtypes.get(key, torch.float32)) not in (None, tensor.dtype):
-                raise SettingError(f"{self.name}: {key} has type {tensor.dtype}, not {dtype}")
+        check_form(self.name, learned, self._shapes(*shape), self.dtypes)
+
+    def _batched(self, familiarity: Callable[[Images], torch.Tensor], views: Images) -> torch.Tensor:
+        """Familiarity of views, batch by batch. Raises SettingError where it is not finite."""
+        results = torch.cat([familiarity(self._on_device(batch)) for batch in in_batches(views)])
+        check_familiarity(self.name, results)
+        return results
 
     def _on_device(self, tensor: torch.Tensor) -> torch.Tensor:
         return tensor.to(self.device)
@@ -295,6 +288,10 @@ class Model(ABC):
     @abstractmethod
     def _scan(self, views: Images) -> Scans:
         """Familiarity of each rotation of views that were checked."""
+
+    def _score(self, views: Images) -> Scores:
+        """Familiarity of views that were checked, at their present heading. Most models have a quicker way."""
+        return self._scan(views)[:, 0]
 
     def _prepare(self) -> None:  # noqa: B027  # most models need nothing
         """Derive from `learned` what scanning needs. Attributes are replaced, never changed in place (see `restore`)."""

@@ -1,5 +1,7 @@
 """What models refuse: views and learned numbers that cannot be used."""
 
+from collections.abc import Mapping
+
 import torch
 from jaxtyping import Float32
 
@@ -34,6 +36,42 @@ def check_scan(views: Images, shape: tuple[int, ...] | None, partial: bool = Fal
             f"this model learned views of shape {tuple(shape)}, got {tuple(views.shape[1:])}; encode both in the same way"
         )
     check_values(views, partial)
+
+
+def check_form(
+    name: str,
+    learned: Mapping[str, torch.Tensor],
+    expected: Mapping[str, tuple[int | None, ...]],
+    dtypes: Mapping[str, torch.dtype | None],
+) -> None:
+    """Refuse tensors that a model learns by other names, in other shapes (None: of any size) or types. Raises SettingError."""
+    if learned.keys() != expected.keys():
+        raise SettingError(f"{name}: it learns {', '.join(expected)}, not {', '.join(learned) or 'nothing'}")
+    for key, tensor in learned.items():
+        fits = tensor.ndim == len(expected[key]) and all(
+            want in (None, size) and size > 0 for want, size in zip(expected[key], tensor.shape, strict=True)
+        )
+        if not fits:
+            raise SettingError(f"{name}: {key} has shape {tuple(tensor.shape)}, not {expected[key]}")
+        if (dtype := dtypes.get(key, torch.float32)) not in (None, tensor.dtype):
+            raise SettingError(f"{name}: {key} has type {tensor.dtype}, not {dtype}")
+
+
+def check_bounded(name: str, learned: Mapping[str, torch.Tensor], partial: bool) -> None:
+    """Refuse learned numbers that are not finite or over MAX_VALUE; see `check_values`. Raises SettingError."""
+    for key, tensor in learned.items():
+        if tensor.is_floating_point() and not all_bounded(tensor, partial):
+            raise SettingError(
+                f"{name}: the {key} are not finite, or over {MAX_VALUE:g}; if they grew without bound, give a lower rate"
+            )
+
+
+def check_familiarity(name: str, familiarity: torch.Tensor) -> None:
+    """Refuse familiarity that is not finite. Raises SettingError."""
+    if not torch.isfinite(familiarity).all():
+        raise SettingError(
+            f"{name}: familiarity is beyond float32 (did training end with large weights?); scale the views"
+        )
 
 
 def check_values(views: Images, partial: bool = False) -> None:

@@ -5,10 +5,11 @@ from jaxtyping import Float32
 
 from tussock.world.settings import number, whole
 
-from .base import Images, Learned, Scans, Shapes, model
+from .base import Images, Learned, Scans, Scores, Shapes, model
 from .checks import MAX_VALUE
 from .filter_bank import FilterBank
 from .incremental import IncrementalModel
+from .rotations import one_by_one
 from .spectra import Spectra
 
 # Presets of the rate: eta / N of one update, for `units` units of `inputs` inputs.
@@ -113,6 +114,10 @@ class Infomax(IncrementalModel):
         for chunk in self._spectra.chunks(views):
             activity[chunk.views] += chunk.absolute()
         return -activity
+
+    def _score(self, views: Images) -> Scores:
+        weights = self._learned["weights"].flatten(start_dim=1)
+        return -one_by_one(lambda view: (weights @ view).abs().sum(), self._seen(views).flatten(start_dim=1))
 
 
 def infomax_update(

@@ -17,7 +17,7 @@ from tussock.world.errors import SettingError
 from tussock.world.geometry import columns_of_turn
 from tussock.world.settings import choice, number, numbers, whole, wholes
 
-from .base import Images, Learned, Model, Scans, Shapes, model
+from .base import Images, Learned, Model, Scans, Scores, Shapes, model
 from .checks import check_scan, check_training
 from .rotations import one_by_one
 
@@ -172,6 +172,10 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         """The first layer's weights are the engine's filters; the others see its units at each rotation."""
         activity = ACTIVATIONS[self.activation](self._responses(views))  # (n, w, units)
         return one_by_one(lambda units: forward(units, self._layers[1:], self.activation), activity)
+
+    def _score(self, views: Images) -> Scores:
+        pixels = self._seen(views).flatten(start_dim=1)
+        return one_by_one(lambda view: forward(view, self._layers, self.activation), pixels)
 
     def _train(self, inputs: torch.Tensor, targets: torch.Tensor) -> Layers:
         """Fitted layers."""

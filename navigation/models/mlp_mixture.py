@@ -1,7 +1,7 @@
 """A small network for each segment of the route; the one to which a view is most familiar is the active expert."""
 
 import torch
-from jaxtyping import Int64
+from jaxtyping import Float32, Int64
 
 from tussock.world.errors import SettingError
 from tussock.world.settings import whole
@@ -46,7 +46,7 @@ class MLPMixture(MLPRotation):
 
     def active_expert(self, views: Images) -> Int64[torch.Tensor, "n w"]:
         """The segment to whose network each rotation is most familiar."""
-        return self._outputs(self._on_device(views)).argmax(dim=2)
+        return self._outputs(self._responses(self._on_device(views))).argmax(dim=2)
 
-    def _scan(self, views: Images) -> Scans:
-        return self._outputs(views).logsumexp(dim=2)
+    def _familiarity(self, outputs: Float32[torch.Tensor, "n w networks"]) -> Scans:
+        return outputs.logsumexp(dim=2)

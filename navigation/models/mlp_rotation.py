@@ -11,8 +11,8 @@ from torch.nn.functional import log_softmax, relu
 from tussock.world.errors import SettingError
 from tussock.world.settings import number, whole
 
-from .base import Images, Learned, Model, Scans, Shapes, model
-from .filter_bank import FilterBank
+from .base import Images, Learned, Model, Scans, Scores, Shapes, model
+from .filter_bank import FilterBank, responses_ahead
 from .rotations import gaussian, one_by_one
 
 
@@ -98,13 +98,18 @@ class MLPRotation(Model):
     def _prepare(self) -> None:
         self._responses = self._bank(self.learned["weights"], self.learned["biases"]).responses
 
-    def _outputs(self, views: Images) -> Float32[torch.Tensor, "n w networks"]:
-        return one_by_one(
-            lambda responses: network_outputs(responses[None], self.learned["output"])[0], self._responses(views)
-        )
+    def _outputs(self, responses: Float32[torch.Tensor, "n w all_units"]) -> Float32[torch.Tensor, "n w networks"]:
+        return one_by_one(lambda each: network_outputs(each[None], self.learned["output"])[0], responses)
 
     def _scan(self, views: Images) -> Scans:
-        return self._outputs(views)[..., 0]
+        return self._familiarity(self._outputs(self._responses(views)))
+
+    def _score(self, views: Images) -> Scores:
+        responses = responses_ahead(self.learned["weights"], self._seen(views), self.learned["biases"])
+        return self._familiarity(self._outputs(responses))[:, 0]
+
+    def _familiarity(self, outputs: Float32[torch.Tensor, "n w networks"]) -> Scans:
+        return outputs[..., 0]
 
 
 def jittered(views: Images, deviation: float, random: torch.Generator) -> Images:

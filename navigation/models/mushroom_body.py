@@ -15,11 +15,11 @@ from tussock.world.geometry import turn_of_columns
 from tussock.world.settings import choice, number, whole
 
 from ..threads import in_threads
-from .base import Images, Learned, Scans, Shapes, model
+from .base import Images, Learned, Scans, Scores, Shapes, model
 from .filter_bank import FilterBank
 from .firing import CELLS, largest_drives
 from .incremental import IncrementalModel
-from .rotations import gaussian, smoothed
+from .rotations import gaussian, one_by_one, smoothed, weights_ahead
 
 MAX_NUMBERS = 2**28  # in an array that is made on the way: 1 GB
 BATCH = 128  # views that are learned at once
@@ -188,13 +188,18 @@ class MushroomBody(IncrementalModel):
         return self._bank(self._on_device(fields.double()))  # so that neurons that see the same respond alike
 
     def _scan(self, views: Images) -> Scans:
-        scans = []
+        return smoothed(self._familiarity(views, slice(None)), np.radians(self.smoothing_deg))
+
+    def _score(self, views: Images) -> Scores:
+        rotations, weights = map(self._on_device, weights_ahead(views.shape[2], math.radians(self.smoothing_deg)))
+        return one_by_one(lambda each: each @ weights, self._familiarity(views, rotations))
+
+    def _familiarity(self, views: Images, rotations: slice | torch.Tensor) -> Float32[torch.Tensor, "n k"]:
+        """Minus the least output at some rotations of each view."""
         wiring, synapses = self._learned["wiring"], self._learned["synapses"]
         fields = self._fields_for(views.shape[1], views.shape[2])
-        for view in views:
-            firing = self._firing(self._projection(fields, view), wiring)
-            scans.append(-outputs_of(synapses, firing).amin(dim=0))
-        return smoothed(torch.stack(scans), np.radians(self.smoothing_deg))
+        firing = (self._firing(self._projection(fields, view)[:, rotations], wiring) for view in views)
+        return torch.stack([-outputs_of(synapses, cells).amin(dim=0) for cells in firing])
 
     def _projection(self, fields: FilterBank, view: Float32[torch.Tensor, "h w"]) -> Float32[torch.Tensor, "neurons w"]:
         """Output of the projection neurons at each rotation.

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import torch
 
 from ..feature_mask import FeatureMask, seeing
-from .base import FamiliarityModel, Images, Learned, Model, Scans, Shapes, memory_bytes, recognises
+from .base import FamiliarityModel, Images, Learned, Model, Scans, Scores, Shapes, memory_bytes, recognises, score
 from .incremental import IncrementalModel
 
 OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
@@ -85,6 +85,9 @@ class Opponent(Model):
     def _scan(self, views: Images) -> Scans:
         return self.attractive.scan(views) - self.repulsive.scan(views)
 
+    def _score(self, views: Images) -> Scores:
+        return self.attractive.score(views) - self.repulsive.score(views)
+
 
 class IncrementalOpponent(Opponent, IncrementalModel):
     """Opponent memories of a model that learns view by view."""
@@ -121,6 +124,10 @@ class OutsideOpponent:
     def scan(self, views: Images) -> Scans:
         """Familiarity of each rotation, of the attractive memory less that of the repulsive one."""
         return self.attractive.scan(views) - self.repulsive.scan(views)
+
+    def score(self, views: Images) -> Scores:
+        """The same at the present heading."""
+        return score(self.attractive, views) - score(self.repulsive, views)
 
     @property
     def recognises(self) -> bool:

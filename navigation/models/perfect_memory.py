@@ -11,7 +11,7 @@ from tussock.world.errors import SettingError
 
 from ..feature_mask import energies, is_partial
 from ..overlap import BLOCK, overlaps
-from .base import Images, Learned, Scans, Shapes, Windows, model
+from .base import Images, Learned, Scans, Scores, Shapes, Windows, model
 from .checks import check_scan
 from .filter_bank import FilterBank, NearestFilters
 from .growing import Growing
@@ -94,6 +94,7 @@ class PerfectMemory(IncrementalModel):
         if self.mask is not None and self.mask.partial:
             self._overlaps = list(overlaps(self.snapshots, self.mask))
             return
+        self._on_cpu = self.snapshots.cpu().numpy()
         if self.mask is not None:
             self._banks = self._compared_seen(snapshots)
             return
@@ -103,7 +104,6 @@ class PerfectMemory(IncrementalModel):
         self._filters = (
             NearestFilters(-2 * centred, new) if self._filters is None else self._filters.appended(-2 * centred, new)
         )
-        self._on_cpu = self.snapshots.cpu().numpy()
 
     def _compared_seen(self, snapshots: Images) -> Banks:
         """The same behind a mask: snapshots in blocks of FILTERS, each with its |s|^2."""
@@ -117,6 +117,13 @@ class PerfectMemory(IncrementalModel):
 
     def _scan(self, views: Images) -> Scans:
         return self._nearest(views)[0]
+
+    def _score(self, views: Images) -> Scores:
+        if is_partial(self.mask):  # the familiarity of a rotation that is not compared depends on the others
+            return super()._score(views)
+        squared = torch.from_numpy(_least(self._seen(views).contiguous().cpu().numpy(), self._on_cpu))
+        squared = squared if self.mask is None else self._coarse(squared)
+        return self._on_device(-(squared / self._size(*views.shape[1:])).sqrt().float())
 
     def _nearest(
         self, views: Images, windows: Windows | None = None, among: slice = slice(None)
@@ -212,6 +219,17 @@ def _decide_exactly(views, snapshots, first, last, allowed, tolerance, doubtful,
                 distance = _distance(turned, snapshots[k], squared[v, turn])
                 if distance < squared[v, turn]:
                     squared[v, turn], index[v, turn] = distance, k
+
+
+@compiled
+def _least(views, snapshots):
+    """Squared distance (n,) of each view from the snapshot that is the most similar to it as it is."""
+    squared, view = np.full(len(views), np.inf), np.empty(views.shape[1:])
+    for v in range(len(views)):
+        view[:] = views[v]
+        for k in range(len(snapshots)):
+            squared[v] = min(squared[v], _distance(view, snapshots[k], squared[v]))
+    return squared
 
 
 @compiled(fastmath={"reassoc"})

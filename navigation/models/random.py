@@ -2,9 +2,9 @@
 
 import numpy as np
 import torch
-from jaxtyping import UInt64
+from jaxtyping import Float32, UInt64
 
-from .base import Images, Learned, Model, Scans, Shapes, model
+from .base import Images, Learned, Model, Scans, Scores, Shapes, model
 
 
 @model
@@ -37,7 +37,7 @@ class RandomHeadings(Model):
         self._columns = columns[self._at]
 
     def _scan(self, views: Images) -> Scans:
-        pixels = (views.cpu().numpy() + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 becomes 0
+        pixels = as_numbers(views)
         if self.mask is None:
             hashes = split_mix(split_mix((pixels * self._rows[:, None]).sum(axis=1)) @ self._columns)
         else:
@@ -47,7 +47,21 @@ class RandomHeadings(Model):
             )  # (n, w, w) each column where each of the mask hides some of it
             column = np.arange(len(self._at))[:, None]
             hashes = split_mix((seen[:, column, self._at] * self._columns).sum(axis=1))
+        return self._shares(hashes)
+
+    def _score(self, views: Images) -> Scores:
+        rows = self._rows[:, None] * (1 if self.mask is None else self.mask.visible.numpy().astype(np.uint64))
+        seen = split_mix((as_numbers(views) * rows).sum(axis=1))  # (n, w)
+        return self._shares(split_mix(seen @ self._columns[:, 0]))
+
+    def _shares(self, hashes: UInt64[np.ndarray, "*shape"]) -> Float32[torch.Tensor, "*shape"]:
+        """Hashes as numbers from 0 to 1."""
         return self._on_device(torch.from_numpy((hashes >> np.uint64(40)).astype(np.float32) * np.float32(2**-24)))
+
+
+def as_numbers(views: Images) -> UInt64[np.ndarray, "n h w"]:
+    """The bits of each pixel."""
+    return (views.cpu().numpy() + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 becomes 0
 
 
 def split_mix(numbers: UInt64[np.ndarray, "..."]) -> UInt64[np.ndarray, "..."]:

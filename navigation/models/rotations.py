@@ -5,10 +5,11 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
-from jaxtyping import Float32
+from jaxtyping import Float32, Int64
 
 from tussock.world.geometry import turn_of_columns
 
+NEGLIGIBLE = 1e-6  # weight of a rotation, as a share of the largest, that changes no average in float32
 ROTATIONS = 6144  # of views that a model scores at once; what is held on the way is then 100 MB or so
 
 
@@ -52,3 +53,17 @@ def smoothed(scans: Float32[torch.Tensor, "n w"], deviation: float) -> Float32[t
     weights = gaussian(width, deviation)[(rotation[:, None] - rotation) % width]
     weights = weights.to(scans.device)
     return one_by_one(lambda scan: scan @ weights, scans)
+
+
+def weights_ahead(
+    width: int, deviation: float
+) -> tuple[Int64[torch.Tensor, " rotations"], Float32[torch.Tensor, " rotations"]]:
+    """The rotations that `smoothed` averages at rotation 0, and their weights.
+
+    Args:
+        width: Number of rotations.
+        deviation: Standard deviation (rad) of the Gaussian weights; with 0 it is rotation 0 alone.
+    """
+    weights = gaussian(width, deviation) if deviation else torch.ones(1)
+    rotations = (weights > NEGLIGIBLE * weights[0]).nonzero()[:, 0]
+    return rotations, weights[rotations]

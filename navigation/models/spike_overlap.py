@@ -11,7 +11,7 @@ from torch.nn.functional import embedding_bag
 from tussock.world.errors import SettingError
 from tussock.world.settings import number, whole, wholes
 
-from .base import Images, Learned, Scans, Shapes, Windows, model
+from .base import Images, Learned, Scans, Scores, Shapes, Windows, model
 from .checks import check_scan
 from .incremental import IncrementalModel
 from .mushroom_body import MAX_NUMBERS
@@ -112,11 +112,15 @@ class SpikeOverlap(IncrementalModel):
     def _scan(self, views: Images) -> Scans:
         return torch.stack([self._nearest(view)[0] for view in views])
 
+    def _score(self, views: Images) -> Scores:
+        return torch.cat([self._nearest(view, np.zeros(1, dtype=int))[0] for view in views])
+
     def _nearest(
-        self, view: Float32[torch.Tensor, "h w"]
-    ) -> tuple[Float32[torch.Tensor, " w"], Int64[torch.Tensor, " w"]]:
-        """Overlap with, and index of, the most similar learned code, at each rotation; -1 where no cell fires."""
-        codes = self._codes(self._learned, view, np.arange(view.shape[1])).float()
+        self, view: Float32[torch.Tensor, "h w"], rotations: np.ndarray | None = None
+    ) -> tuple[Float32[torch.Tensor, " n"], Int64[torch.Tensor, " n"]]:
+        """Overlap with, and index of, the most similar learned code, at some rotations (None: all); -1 where no cell fires."""
+        rotations = np.arange(view.shape[1]) if rotations is None else rotations
+        codes = self._codes(self._learned, view, rotations).float()
         sizes = codes.sum(dim=1)
         shared = codes @ self._kept.T  # whole numbers, so that they are the same in any order
         overlap, index = (shared / (sizes.clamp(min=1)[:, None] * self._sizes).sqrt()).max(dim=1)

@@ -11,7 +11,7 @@ from tussock.world.errors import SettingError
 from tussock.world.settings import number, switch, whole
 
 from ..threads import in_threads
-from .base import Images, Learned, Scans, Shapes, model
+from .base import Images, Learned, Scans, Scores, Shapes, model
 from .checks import check_scan
 from .incremental import IncrementalModel
 from .spikes import Neuron, Plasticity, fire, learn, peaks, respond, steps_to_spike, synaptic_currents
@@ -129,17 +129,24 @@ class SpikingMushroomBody(IncrementalModel):
         return {"wiring": (self.cells, min(self.inputs, self._size(height, width))), "synapses": (self.cells,)}
 
     def _scan(self, views: Images) -> Scans:
+        return self._familiarity(views, np.arange(views.shape[2]))
+
+    def _score(self, views: Images) -> Scores:
+        return self._familiarity(views, np.zeros(1, np.int64))[:, 0]
+
+    def _familiarity(self, views: Images, rotations: Int64[np.ndarray, " k"]) -> Float32[torch.Tensor, "n k"]:
+        """Familiarity at some rotations of each view."""
         wiring, synapses = self._learned["wiring"], self._learned["synapses"].cpu().numpy()
         output = self._neuron(self.output_synapse_ms)
-        scans = np.empty((len(views), views.shape[2]), np.float32)
+        scans = np.empty((len(views), len(rotations)), np.float32)
         block = max(1, NUMBERS // self._size(*views.shape[1:]))
         for view, scan in zip(views.cpu(), scans, strict=True):
             for start in range(0, len(scan), block):
-                rotations = np.arange(start, min(start + block, len(scan)))
-                counts, sums = np.empty(len(rotations)), np.empty(len(rotations))
-                spikes = self._spikes(view, rotations, wiring)
+                some = slice(start, min(start + block, len(scan)))
+                counts, sums = np.empty(some.stop - start), np.empty(some.stop - start)
+                spikes = self._spikes(view, rotations[some], wiring)
                 respond(spikes, synapses, self.steps, output, counts, sums)
-                scan[rotations] = -counts - (sums / (1 + sums) if self.break_ties else 0)  # from 0 to 1
+                scan[some] = -counts - (sums / (1 + sums) if self.break_ties else 0)  # from 0 to 1
         return self._on_device(torch.from_numpy(scans))
 
     def _spikes(

@@ -6,7 +6,7 @@ from jaxtyping import Int64
 from tussock.world.errors import SettingError
 
 from ..feature_mask import is_partial
-from .base import Images, Learned, Model, Scans, Shapes, Windows, model
+from .base import Images, Learned, Model, Scans, Scores, Shapes, Windows, model
 from .checks import check_scan
 from .perfect_memory import PerfectMemory
 
@@ -49,3 +49,6 @@ class VisualCompass(Model):
 
     def _scan(self, views: Images) -> Scans:
         return self._memory.scan(views)
+
+    def _score(self, views: Images) -> Scores:
+        return self._memory.score(views)

@@ -25,7 +25,7 @@ from tussock.world.scene import World
 from ..failures import Cause, Diagnosis
 from ..stopping import StopReason
 from ..training import training_source
-from ..walk import Step
+from ..walker import Step
 from .blueprint import CAUSE_COLOURS, TIMELINE, blueprint, cause_entity, image_format
 from .columns import bar_chart_columns, image_columns
 from .viewer import check_viewer

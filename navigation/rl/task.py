@@ -26,7 +26,8 @@ from ..stopping import StoppingRules, StopReason
 from ..surroundings import GROUNDS, Surroundings
 from ..training import poses_of_setup, training_views
 from ..training_setup import TrainingSetup
-from ..walk import Walk, check_inside
+from ..walk import Walk
+from ..walker import check_inside
 
 SURROUNDINGS, BODY, RULES = Surroundings(), Body(), StoppingRules()  # whose defaults are those of a task
 ARRIVAL_REWARD = 1.0  # on top of the metres: a learner that passes the goal to the side has come as far

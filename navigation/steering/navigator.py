@@ -1,7 +1,7 @@
 """What a navigator is: it gets what agents perceive, and decides how they move."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -20,10 +20,15 @@ class Look:
     Attributes:
         views: (n, h, w) Encoded views, ahead in the middle.
         compass: (n,) Heading as the agent's compass reads it (rad).
+        odometry: (n,) Distance walked since the look before, as the agent measures it (m); 0 at the first look. None where an agent
+            has no odometry, as a hand-held camera.
+        touch: (n,) Whether the agent was stopped by an obstacle, or slid along one, since the look before. None: it cannot feel.
     """
 
     views: Images
     compass: Float[np.ndarray, " n"]
+    odometry: Float[np.ndarray, " n"] | None = None
+    touch: Bool[np.ndarray, " n"] | None = None
 
     def __len__(self) -> int:
         return len(self.views)
@@ -47,6 +52,24 @@ class ScanRecord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Journey:
+    """A way that an agent has walked, as its compass and odometer read it.
+
+    Attributes:
+        compass: (k,) Heading of each part of the way (rad).
+        odometry: (k,) Length of each part (m).
+    """
+
+    compass: Float[np.ndarray, " k"]
+    odometry: Float[np.ndarray, " k"]
+
+    @property
+    def vector(self) -> Float[np.ndarray, "2"]:
+        """From its beginning to its end (m, east and north)."""
+        return np.array([self.odometry @ np.cos(self.compass), self.odometry @ np.sin(self.compass)])
+
+
+@dataclass(frozen=True, kw_only=True)
 class Motion:
     """How n agents are to move: turn, then step ahead.
 
@@ -54,11 +77,21 @@ class Motion:
         turn: (n,) To the left (rad).
         step: (n,) Share of the body's step length, 0 to 1; None means whole steps.
         scan: What the decision was made from, where it was a scan.
+        looks: (n,) Headings that were looked at for the decision; None means one, or those of the scan.
+        signals: (n,) or (n, k) What the decision was made from, by names of the navigator's own; for recordings and tables.
     """
 
     turn: Float[np.ndarray, " n"]
     step: Float[np.ndarray, " n"] | None = None
     scan: ScanRecord | None = None
+    looks: Int[np.ndarray, " n"] | None = None
+    signals: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def looks_of(self, row: int) -> int:
+        """Headings that an agent looked at."""
+        if self.looks is not None:
+            return int(self.looks[row])
+        return 1 if self.scan is None else int(self.scan.window[row].sum())
 
 
 @runtime_checkable
@@ -87,9 +120,41 @@ class Navigator(Protocol):
         ...
 
 
+@runtime_checkable
+class PathIntegrating(Navigator, Protocol):
+    """A navigator whose agents remember the way from the goal to where their walk begins."""
+
+    def travel(self, memory: Any, journey: Journey) -> None:
+        """Take in the way from the goal to where a walk begins, before its first look.
+
+        Args:
+            memory: What the agent remembers, as `begin` made it; changed in place.
+            journey: The way, as the agent measured it.
+        """
+        ...
+
+
+@runtime_checkable
+class LearningPlaces(Navigator, Protocol):
+    """A navigator that learns where views were seen, by the agent's own path integration; its `learn_at` takes the place of `learn`."""
+
+    def learn_at(self, views: Images, places: Float[np.ndarray, "n 3"]) -> None:
+        """Learn the views of a route or a learning flight.
+
+        Args:
+            views: (n, h, w) In their order.
+            places: (n, 3) Where they were seen, from the goal (m, east and north), and the heading (rad), as the agent measured them.
+        """
+        ...
+
+
 def check_motion(motion: Motion, n: int, navigator: Navigator) -> None:
     """Refuse a motion that n agents cannot make. Raises SettingError."""
     step = np.ones(n) if motion.step is None else np.asarray(motion.step)
+    if short := [name for name, values in motion.signals.items() if len(values) != n]:
+        raise SettingError(
+            f"{type(navigator).__name__} gave the signal {short[0]!r} for {len(motion.signals[short[0]])} of {n} agents"
+        )
     valid = (
         np.shape(motion.turn) == step.shape == (n,)
         and np.isfinite(motion.turn).all()

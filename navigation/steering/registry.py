@@ -7,5 +7,9 @@ _HERE = "tussock.navigation.steering"
 NAVIGATORS = Registry(
     "navigators",
     "navigator",
-    {"scan": f"{_HERE}.scan:Scan", "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan"},
+    {
+        "scan": f"{_HERE}.scan:Scan",
+        "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan",
+        "lateral": f"{_HERE}.lateral:Lateral",
+    },
 )

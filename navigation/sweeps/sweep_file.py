@@ -14,7 +14,8 @@ from typing import Any
 from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.params import is_generated
 
-from ..experiment import MODEL_SUFFIX, Experiment
+from ..experiment import Experiment
+from ..experiment_fields import MODEL_SUFFIX
 from ..experiment_keys import WALK_SETTINGS
 from ..experiment_settings import TYPES, experiment_of
 from ..models.files import TrainedModel

@@ -1,0 +1,50 @@
+"""What the fields of an experiment are made of: encodings, models and navigators from their names, specs and files."""
+
+from pathlib import Path
+from typing import Any
+
+from tussock.world.errors import FileError, SettingError
+from tussock.world.specs import Spec
+
+MODEL_SUFFIX = ".safetensors"  # of files of trained models
+
+
+def as_encoding(value: Any, experiment: Any = None) -> Any:
+    """An encoding from a preset's name or a chain; a preset reduces the view of the eye to about FINE_WIDTH columns."""
+    from .encoding import PRESETS, Encoding, automatic_resize
+
+    if isinstance(value, Encoding):
+        return value
+    if not isinstance(value, str):
+        raise SettingError(f"encoding is {value!r}; give a preset's name, a chain or an Encoding")
+    return Encoding.named(value, resize=automatic_resize(experiment.eye) if value in PRESETS else 1.0)
+
+
+def as_model(value: Any) -> Any:
+    """A model from its spec, its file or an untrained one."""
+    if isinstance(value, Path) or (isinstance(value, str) and value.endswith(MODEL_SUFFIX)):
+        if not Path(value).is_file():
+            raise FileError(f"there is no model file {value}; check the name")
+        return Path(value)
+    if isinstance(value, Spec):
+        return value
+    from .models import MODELS, model_spec
+    from .models.base import Model
+    from .models.opponents import Opponent
+
+    if isinstance(value, Model) and (value.shape is not None or value.seed or value.device != "cpu"):
+        raise SettingError(
+            f"{value!r} has learned, or has a seed or device; give an untrained model, and seed and device to the experiment"
+        )
+    return model_spec(str(value)) if isinstance(value, str | Opponent) else MODELS.spec_of(value)
+
+
+def as_navigator(value: Any) -> Any:
+    """A navigator from its spec."""
+    from .steering import NAVIGATORS
+
+    if isinstance(value, str):
+        return NAVIGATORS.spec(value)
+    if isinstance(value, Spec | type):
+        return value if isinstance(value, Spec) else NAVIGATORS.spec_of(value)
+    raise SettingError(f"navigator is {value!r}; give a spec, such as 'scan', or a class")
