@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from tussock.navigation.steering.central_complex import CentralComplexSteering, familiar_direction
-from tussock.navigation.steering.navigator import Journey, Look, check_motion
+from tussock.navigation.steering.navigator import Journey, Look, Motion, check_motion
 from tussock.navigation.steering.path_integration import PathIntegration, Search
 from tussock.world.errors import SettingError
 from tussock.world.geometry import wrap_angle
@@ -32,7 +32,7 @@ class Plane:
             navigator.travel(memory, way)
         self.positions = [np.array([way.vector for way in ways])]
         self.headings = [np.array([way.compass[-1] for way in ways])]
-        self.walked, self.motion = np.zeros(len(ways)), None
+        self.walked, self.motion = np.zeros(len(ways)), Motion(turn=np.zeros(len(ways)))
 
     def walk(self, steps):
         """The distance from the nest (n, steps + 1) before and after each step from here on."""
