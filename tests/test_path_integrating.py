@@ -189,6 +189,17 @@ def test_vision_weighs_what_is_familiar_against_the_home_vector():
     assert turns[0.0] < 0 < turns[1.0]
 
 
+def test_the_visual_vector_is_in_the_directions_of_the_compass():
+    navigator = CentralComplexSteering(model=Facing(), vision=1.0)
+    views = torch.zeros(3, 1, 16)
+    views[:, 0, 4] = 1.0  # 90 degrees to the left
+    compass = np.array([0.3, 1.9, -2.0])
+    look = Look(views=views, compass=compass, odometry=np.zeros(3))
+    vector = navigator.decide(look, [navigator.begin() for _ in range(3)]).signals["visual_vector"]
+    directions = np.stack([np.cos(compass + np.pi / 2), np.sin(compass + np.pi / 2)], axis=1)
+    assert np.allclose(vector, navigator.balance * directions, atol=1e-5)
+
+
 def test_without_a_model_there_is_no_vision():
     navigator = CentralComplexSteering(vision=0.5)
     look = Look(views=torch.zeros(1, 1, 8), compass=np.zeros(1), odometry=np.zeros(1))
