@@ -72,10 +72,12 @@ class PathIntegration:
     Attributes:
         arrival: The search begins within this distance of the end of the vector (m).
         growth: Diameter of the first loop, and what each is wider than the last (m).
+        reach: Length of the vector at which an agent is half certain of it (m), where `blend` asks.
     """
 
     arrival: float = number(0.05, above=0, unit="m")
     growth: float = number(0.3, above=0, unit="m")
+    reach: float = number(1.0, above=0, unit="m")
 
     def learn(self, views: Images) -> None:
         """Learn nothing: it steers without views."""
@@ -105,7 +107,8 @@ class PathIntegration:
         for memory, first in zip(memories, turn, strict=True):
             if memory.side is None:
                 memory.side = 1 if first > -1e-9 else -1
-        return Motion(turn=turn, signals={"home_vector": homes})
+        length = np.hypot(*homes.T)
+        return Motion(turn=turn, certainty=length / (length + self.reach), signals={"home_vector": homes})
 
 
 def distance_walked(look: Look, navigator: str) -> Float[np.ndarray, " n"]:

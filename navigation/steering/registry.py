@@ -11,6 +11,8 @@ NAVIGATORS = Registry(
         "scan": f"{_HERE}.scan:Scan",
         "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan",
         "lateral": f"{_HERE}.lateral:Lateral",
+        "path-integration": f"{_HERE}.path_integration:PathIntegration",
+        "central-complex": f"{_HERE}.central_complex:CentralComplexSteering",
         "blend": f"{_HERE}.blend:Blend",
         "loop-breaker": f"{_HERE}.loop_breaker:LoopBreaker",
     },
