@@ -8,9 +8,10 @@ from typing import Any
 
 import attrs
 import numpy as np
+import pandas as pd
 import pytest
 import torch
-from commands import printed, tussock
+from commands import printed
 from small_models import SMALL
 
 from tussock.navigation.body import Body
@@ -50,6 +51,7 @@ ENCODING = Encoding.named(
 )  # of whose mirrored views the features are mirrored, to the last bit
 STARTS = (0.0, 0.1, -0.15)  # m to the left of the route
 STEPS = 16
+OF_STEERING = ["steps", "mean_deviation_m", "looks_per_m", "touches", "inward", "outward", "goal_m", "recovered"]
 
 
 class Plain:
@@ -238,41 +240,42 @@ def steps_in(walk: Walk, navigator: Navigator) -> list[list[Step]]:
     return [[step for step in steps if step] for steps in zip(*walk.steps(navigator), strict=True)]
 
 
+def walks_in_mirror(name: str, *, mirrored: bool) -> list[list[Step]]:
+    """Walks in the world, or in its mirror image. What is learned is mirrored as it is, in the same order."""
+    parameters = WITHOUT_NOISE.get(name, {})
+    if takes(NAVIGATORS.find(name), "first"):
+        parameters = parameters | {"first": "right" if mirrored else "left"}
+    here = experiment(name, navigator=spec(name, **parameters))
+    with here.open_renderer(WORLD) as renderer:
+        views, poses = here.training_views(renderer, ROUTE)
+    sign, world, route, noise = 1, WORLD, ROUTE, np.random.Generator
+    if mirrored:
+        sign, world, route, noise = -1, mirrored_world(WORLD), Route(mirrored_poses(ROUTE.poses)), Mirrored
+        views, poses = views.flip(2), mirrored_poses(poses)
+    given = here.replace(world=world, route=route)
+    with given.open_renderer(world) as renderer:
+        trained = given.train(renderer, route, views=(views, poses))
+        walk = Walk(
+            renderer=renderer,
+            encoding=given.encoding,
+            route=route,
+            starts=[route.start.moved(0.0, sign * left) for left in STARTS],
+            body=given.body,
+            stopping=given.stopping,
+            noise=[noise(np.random.PCG64(seed)) for seed in range(len(STARTS))],
+        )
+        return steps_in(walk, trained.navigator)
+
+
 def test_a_mirrored_world_mirrors_the_walk(name):
     if name in NOT_MIRRORED:
         pytest.skip(NOT_MIRRORED[name])
-    sides = ("left", "right") if takes(NAVIGATORS.find(name), "first") else (None, None)
-    paths, views = [], None
-    for mirrored, first in enumerate(sides):
-        parameters = WITHOUT_NOISE.get(name, {}) | ({} if first is None else {"first": first})
-        world = mirrored_world(WORLD) if mirrored else WORLD
-        route = Route(mirrored_poses(ROUTE.poses)) if mirrored else ROUTE
-        given = experiment(name, world=world, route=route, navigator=spec(name, **parameters))
-        with given.open_renderer(world) as renderer:
-            if views is None:
-                views = given.training_views(renderer, route)
-            else:  # in their order, which is first left, then right
-                views = (views[0].flip(2), mirrored_poses(views[1]))
-            trained = given.train(renderer, route, views=views)
-            walk = Walk(
-                renderer=renderer,
-                encoding=given.encoding,
-                route=route,
-                starts=[route.start.moved(0.0, -left if mirrored else left) for left in STARTS],
-                body=given.body,
-                stopping=given.stopping,
-                noise=[
-                    (Mirrored if mirrored else np.random.Generator)(np.random.PCG64(seed))
-                    for seed in range(len(STARTS))
-                ],
-            )
-            paths.append(steps_in(walk, trained.navigator))
-    for steps, others in zip(*paths, strict=True):
-        assert len(steps) == len(others)
+    for steps, others in zip(*(walks_in_mirror(name, mirrored=each) for each in (False, True)), strict=True):
         poses, mirror_image = (np.array([step.pose for step in each]) for each in (steps, others))
+        turns, others_turns = (np.array([step.aim for step in each]) for each in (steps, others))
         assert np.allclose(poses, mirrored_poses(mirror_image), rtol=0, atol=1e-6)
-        assert np.allclose([step.aim for step in steps], [-step.aim for step in others], rtol=0, atol=1e-6)
-        assert np.ptp([step.aim for step in steps]) > 0.01  # it did turn
+        assert np.allclose(turns, -others_turns, rtol=0, atol=1e-6)
+        assert np.ptp(turns) > 0.01  # it did turn
 
 
 PERCEIVED = {each.name for each in dataclasses.fields(Look)}
@@ -349,8 +352,8 @@ def test_agents_that_perceive_the_same_elsewhere_decide_the_same(learned):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_it_steers_by_any_model(name, model):
-    (steps,) = walks(experiment(name, model=model_of(model), stopping__max_steps=5))
-    assert len(steps) == 6
+    (steps,) = walks(experiment(name, model=model_of(model), training__spacing=0.25, stopping__max_steps=4))
+    assert len(steps) == 5
     assert all(np.isfinite(step.aim) and step.looks >= 0 for step in steps)
     for step in steps:
         assert all(np.isfinite(value).all() for value in step.signals.values()), step.signals
@@ -362,13 +365,19 @@ def test_it_steers_by_an_eye_that_sees_a_part_of_the_circle_if_it_takes_a_model(
         with pytest.raises(SettingError, match=f"{name}.*takes no model"):
             experiment(name, eye=eye)
         return
-    (steps,) = walks(experiment(name, eye=eye, stopping__max_steps=5))
-    assert len(steps) == 6
-    hidden, *_ = steps
-    assert hidden.view is not None
-    # What is behind the agent makes no difference.
-    (others,) = walks(experiment(name, eye=eye, world=WORLD, stopping__max_steps=5))
-    assert_same(steps, others)
+    given = experiment(name, eye=eye)
+    with given.opened() as trained:
+        mask = given.encoding.for_eye(eye).mask
+        assert mask is not None
+        navigator, memories, others = trained.navigator, *(memories_of(trained.navigator, 3) for _ in range(2))
+        for look in looks_at_random(3, 4):
+            motion = navigator.decide(look, memories)
+            assert np.isfinite(motion.turn).all()
+            behind = torch.where(torch.as_tensor(mask.visible), look.views, 3.0)
+            if all(motion.looks_of(row) == 1 for row in range(3)):  # who turns to look sees more than the field
+                same = navigator.decide(dataclasses.replace(look, views=behind), others)
+                assert rows_of(same, slice(None)) == rows_of(motion, slice(None))
+    assert len(walks(attrs.evolve(given, stopping=StoppingRules(max_steps=3)))[0]) == 4
 
 
 @pytest.fixture(scope="module")
@@ -382,14 +391,14 @@ def model_file(tmp_path_factory) -> Path:
 
 
 def test_a_model_from_a_file_steers_or_is_refused_in_one_line(name, model_file):
-    try:
-        given = experiment(name, model=model_file, stopping__max_steps=3)
-        (steps,) = walks(given)
-    except SettingError as error:
-        assert "\n" not in str(error)
-        assert name in str(error)
-        assert str(model_file) in str(error)
+    target = NAVIGATORS.find(name)
+    if not (takes(target, "model") and getattr(target, "takes_trained", True)):
+        with pytest.raises(SettingError) as refused:
+            experiment(name, model=model_file)
+        assert all(word in str(refused.value) for word in (repr(name), str(model_file)))
+        assert "\n" not in str(refused.value)
         return
+    (steps,) = walks(experiment(name, model=model_file, stopping__max_steps=3))
     (own,) = walks(experiment(name, stopping__max_steps=3))
     assert_same(steps, own)
 
@@ -402,3 +411,46 @@ def test_it_walks_home_when_models_are_compared(name):
     (last, *_) = reversed(walks(given)[0])
     assert row.arrived == (last.reason == "arrived")
     assert row.median_error_deg < 45
+
+
+def test_the_command_that_compares_models_takes_any_navigator(name, capfd):
+    walk = ["--world", "tiny", "--seed", 2, "--route-length-m", 1.6, "--size", "36x8", "--encoding", "grey"]
+    result = printed(capfd, "compare", *walk, "--models", "random", "--navigator", spec(name))
+    assert set(result["models"]) == {"random"}
+
+
+def test_a_sweep_over_all_navigators_has_the_results_of_each_run_alone(tmp_path, cluster):
+    base = Experiment(world="tiny", route_length=1.6, eye=EYE, stopping=StoppingRules(max_steps=STEPS), threads=1)
+    specs = [spec(name) for name in NAMES]
+    result = run_sweep(Sweep.over("", base, {"navigator": specs}), tmp_path, workers=cluster)
+    table = pd.read_parquet(result["table"]).set_index("navigator")
+    assert table["error"].isna().all(), table["error"].dropna().iloc[0]
+    for each in specs:
+        summary, row = base.replace(navigator=each).run().summary(), table.loc[str(each)]
+        assert {name: None if pd.isna(row[name]) else row[name] for name in OF_STEERING} == {
+            name: summary[name] for name in OF_STEERING
+        }
+
+
+@pytest.fixture(scope="module")
+def databases(tmp_path_factory) -> tuple[Path, Path]:
+    """Image databases of the route, and of the views around it."""
+    folder = tmp_path_factory.mktemp("databases")
+    low, high = ROUTE.xy.min(axis=0) - 0.4, ROUTE.xy.max(axis=0) + 0.4
+    with open_renderer(WORLD, EYE, "cpu") as renderer:
+        write_database(folder / "route", renderer, ROUTE.resampled(0.1).poses)
+        write_database(folder / "grid", renderer, Grid.over(Bounds(*low.tolist(), *high.tolist()), 0.1))
+    return folder / "route", folder / "grid"
+
+
+def test_it_walks_over_image_databases(name, databases):
+    route, grid = databases
+    stopping = StoppingRules(max_steps=STEPS)
+    given = Experiment(
+        route_database=route, grid_database=grid, encoding="grey", navigator=spec(name), stopping=stopping, threads=1
+    )
+    (steps,) = walks(given)
+    assert len(steps) > 3
+    assert all(np.isfinite(step.aim) and step.view_distance is not None for step in steps)
+    again, *_ = walks(given)
+    assert_same(steps, again)
