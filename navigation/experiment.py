@@ -107,6 +107,11 @@ class Experiment(Surroundings):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"
             )
+        elif not getattr(self.navigator.target, "takes_trained", True):
+            raise SettingError(
+                f"the navigator {str(self.navigator)!r} learns views that face in other directions than those of a trained model, so it "
+                f"cannot use {self.model}; give a model's name"
+            )
 
     def replace(self, **changes: Any) -> "Experiment":
         """The same with some fields changed, as for `Surroundings`. With another eye, a preset encoding keeps its number of columns."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from math import radians
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -32,6 +32,8 @@ class Lateral:
         slowing: How much slower the agent walks in unfamiliar places: its step is 1 - slowing x (the lower of both unfamiliarities).
         slowest: The shortest step, as a share of a whole one.
     """
+
+    takes_trained: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     gain: float = number(8.0, above=0, unit="rad")
