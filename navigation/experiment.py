@@ -189,6 +189,7 @@ class Experiment(Surroundings):
             poses=poses,
             views=images if images is None or trained is None else shared_views(model, images),
             seconds=time.perf_counter() - began,
+            encoding=self.encoding,
         )
 
     def training_views(self, renderer: "Renderer", route: "Route", progress: Progress = no_progress) -> "TrainingViews":

@@ -12,7 +12,7 @@ from tussock.world.settings import converted, number, settings
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
-from .combined import Remembered, learn_views, made, navigator_spec, travel
+from .combined import Remembered, learn_views, made, models_of, navigator_spec, travel
 from .navigator import Images, Journey, Look, Motion, Navigator
 
 
@@ -41,6 +41,11 @@ class Blend:
     def __attrs_post_init__(self) -> None:
         both = tuple(made(spec, copy.deepcopy(self.model)) for spec in (self.first, self.second))
         object.__setattr__(self, "navigators", both)
+
+    @property
+    def models(self) -> tuple[FamiliarityModel, ...]:
+        """What it steers by."""
+        return models_of(self.navigators)
 
     def learn(self, views: Images) -> None:
         """Let both learn the views (n, h, w)."""

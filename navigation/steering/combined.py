@@ -10,6 +10,7 @@ from numpy import ndarray
 from tussock.world.errors import SettingError
 from tussock.world.specs import Spec
 
+from ..models.base import FamiliarityModel
 from .navigator import Images, Journey, LearningPlaces, Navigator, PathIntegrating
 from .registry import NAVIGATORS
 
@@ -43,6 +44,12 @@ def learn_views(navigators: Sequence[Navigator], views: Images, places: Float[nd
             navigator.learn_at(views.clone(), places)
         else:
             navigator.learn(views.clone())
+
+
+def models_of(navigators: Sequence[Navigator]) -> tuple[FamiliarityModel, ...]:
+    """The trained models that navigators steer by."""
+    own = [getattr(each, "models", None) or (getattr(each, "model", None),) for each in navigators]
+    return tuple(model for models in own for model in models if model is not None)
 
 
 @dataclass

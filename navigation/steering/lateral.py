@@ -46,6 +46,11 @@ class Lateral:
     left: Memory = attrs.field(init=False)
     right: Memory = attrs.field(init=False)
 
+    @property
+    def models(self) -> tuple[FamiliarityModel, FamiliarityModel]:
+        """What both memories have learned."""
+        return self.left.model, self.right.model
+
     def learn(self, views: Images) -> None:
         """Learn views (n, h, w) turned to both sides."""
         for name, side in (("left", 1.0), ("right", -1.0)):

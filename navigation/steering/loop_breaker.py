@@ -15,7 +15,7 @@ from tussock.world.settings import choice, converted, number, settings
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
-from .combined import Remembered, learn_views, made, navigator_spec, travel
+from .combined import Remembered, learn_views, made, models_of, navigator_spec, travel
 from .navigator import Images, Journey, Look, Motion, Navigator
 
 
@@ -48,6 +48,11 @@ class LoopBreaker:
 
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "steers", made(self.navigator, self.model))
+
+    @property
+    def models(self) -> tuple[FamiliarityModel, ...]:
+        """What it steers by."""
+        return models_of([self.steers])
 
     def learn(self, views: Images) -> None:
         """Let the navigator learn the views (n, h, w)."""
