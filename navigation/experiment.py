@@ -83,6 +83,7 @@ class Experiment(Surroundings):
 
     def __attrs_post_init__(self):
         from .models.base import FamiliarityModel
+        from .models.random import RandomHeadings
         from .steering.navigator import Navigator
 
         super().__attrs_post_init__()
@@ -107,7 +108,7 @@ class Experiment(Surroundings):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"
             )
-        elif not getattr(self.navigator.target, "takes_trained", True):
+        elif not getattr(self.navigator.make(model=RandomHeadings()), "takes_trained", True):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} learns views that face in other directions than those of a trained model, so it "
                 f"cannot use {self.model}; give a model's name"

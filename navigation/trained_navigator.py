@@ -48,8 +48,9 @@ class TrainedNavigator:
         from .failures import Diagnostics
         from .models.base import recognises
 
-        several = self.model is None and self.poses is not None and any(map(recognises, self.models))
-        learned = (self.encoding, self.poses) if several else None
+        learned = None
+        if self.model is None and self.poses is not None and any(map(recognises, self.models)):
+            learned = self.encoding, self.poses
         return Diagnostics(self.renderer, self.model, self.route, self.views, learned=learned)
 
     @property
@@ -63,5 +64,5 @@ class TrainedNavigator:
         """Size of what they have learned; None where it steers by none, or one of them does not tell."""
         from .models.base import memory_bytes
 
-        sizes = list(map(memory_bytes, self.models))
-        return None if not sizes or None in sizes else sum(sizes)
+        sizes = [size for model in self.models if (size := memory_bytes(model)) is not None]
+        return sum(sizes) if sizes and len(sizes) == len(self.models) else None

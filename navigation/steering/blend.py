@@ -12,7 +12,7 @@ from tussock.world.settings import converted, number, settings
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
-from .combined import Remembered, learn_views, made, models_of, navigator_spec, travel
+from .combined import Remembered, learn_views, made, models_of, navigator_spec, take_trained, travel
 from .navigator import Images, Journey, Look, Motion, Navigator
 
 
@@ -27,25 +27,30 @@ class Blend:
 
     Attributes:
         model: Of which each navigator that needs one gets a copy.
-        first: A navigator's spec.
-        second: Another's.
-        weight: Of the second, 0 to 1.
+        one: A navigator's spec.
+        other: Another's.
+        weight: Of the other, 0 to 1.
     """
 
     model: FamiliarityModel = attrs.field()
-    first: Spec = converted(default="lateral", converter=navigator_spec)
-    second: Spec = converted(default="path-integration", converter=navigator_spec)
+    one: Spec = converted(default="lateral", converter=navigator_spec)
+    other: Spec = converted(default="path-integration", converter=navigator_spec)
     weight: float = number(0.5, low=0, high=1)
     navigators: tuple[Navigator, Navigator] = attrs.field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        both = tuple(made(spec, copy.deepcopy(self.model)) for spec in (self.first, self.second))
+        both = tuple(made(spec, copy.deepcopy(self.model)) for spec in (self.one, self.other))
         object.__setattr__(self, "navigators", both)
 
     @property
     def models(self) -> tuple[FamiliarityModel, ...]:
         """What it steers by."""
         return models_of(self.navigators)
+
+    @property
+    def takes_trained(self) -> bool:
+        """Whether it can use a model that has learned already."""
+        return take_trained(self.navigators)
 
     def learn(self, views: Images) -> None:
         """Let both learn the views (n, h, w)."""
@@ -79,7 +84,7 @@ class Blend:
         steps = [ones if motion.step is None else motion.step for motion in motions]
         signals = {
             f"{name}_{key}": value
-            for name, motion in zip(("first", "second"), motions, strict=True)
+            for name, motion in zip(("one", "other"), motions, strict=True)
             for key, value in motion.signals.items()
         }
         return Motion(
@@ -88,5 +93,5 @@ class Blend:
             scan=next((motion.scan for motion in motions if motion.scan is not None), None),
             certainty=np.abs(vector).clip(0, 1),
             looks=np.array([max(motion.looks_of(row) for motion in motions) for row in range(len(look))]),
-            signals=signals | {"weight_of_second": weights[1] / total},
+            signals=signals | {"weight_of_other": weights[1] / total},
         )

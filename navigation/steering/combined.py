@@ -33,6 +33,11 @@ def made(spec: Spec, model: Any) -> Navigator:
     return navigator
 
 
+def take_trained(navigators: Sequence[Navigator]) -> bool:
+    """Whether all of some navigators can use a model that has learned already."""
+    return all(getattr(navigator, "takes_trained", True) for navigator in navigators)
+
+
 def learn_views(navigators: Sequence[Navigator], views: Images, places: Float[ndarray, "n 3"] | None) -> None:
     """Let navigators learn the views of a route; `places` for those that learn them, too."""
     for navigator in navigators:

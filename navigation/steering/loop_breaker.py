@@ -15,7 +15,7 @@ from tussock.world.settings import choice, converted, number, settings
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
-from .combined import Remembered, learn_views, made, models_of, navigator_spec, travel
+from .combined import Remembered, learn_views, made, models_of, navigator_spec, take_trained, travel
 from .navigator import Images, Journey, Look, Motion, Navigator
 
 
@@ -53,6 +53,11 @@ class LoopBreaker:
     def models(self) -> tuple[FamiliarityModel, ...]:
         """What it steers by."""
         return models_of([self.steers])
+
+    @property
+    def takes_trained(self) -> bool:
+        """Whether it can use a model that has learned already."""
+        return take_trained([self.steers])
 
     def learn(self, views: Images) -> None:
         """Let the navigator learn the views (n, h, w)."""
