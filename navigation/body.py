@@ -5,7 +5,7 @@ from typing import Any
 from tussock.world.settings import choice, converted, number, settings
 from tussock.world.specs import Spec
 
-from .senses import SENSES
+from .sense_models import SENSES
 
 COLLISIONS = ("pass", "stop", "slide")
 
@@ -25,7 +25,7 @@ class Body:
         heading_noise: Standard deviation of the normal noise on every turn (rad).
         collisions: What plants and stones do to a step: it may "pass" through them, "stop" where the body touches one, or "slide" along it.
         radius: Of the body, seen from above (m).
-        senses: How well it measures its heading and the distance that it walks: a spec, such as "ant" (see senses.py).
+        senses: How well it measures its heading and the distance that it walks: a spec, such as "ant" (see sense_models.py).
     """
 
     step_length: float = number(0.05, low=1e-6, unit="m")
