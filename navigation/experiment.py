@@ -26,7 +26,7 @@ from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
 from .experiment_fields import as_encoding, as_model, as_navigator
-from .senses import as_senses
+from .sense_models import as_senses
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -59,7 +59,7 @@ class Experiment(Surroundings):
         model: What tells how familiar a view is: a spec, such as "infomax rate=baddeley", or a file of a trained model.
         training: Which views are learned. A model from a file has learned already.
         body: How the agent moves.
-        senses: How well the agent measures its heading and the distance that it walks: a spec, such as "ant" (see senses.py).
+        senses: How well the agent measures its heading and the distance that it walks: a spec, such as "ant" (see sense_models.py).
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
         release: The walk starts this far from the route's end instead (m), facing it. 0: at the route's start.
         release_direction: In which direction of the world from there (rad, counter-clockwise from east).

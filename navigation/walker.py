@@ -15,7 +15,8 @@ from tussock.world.terrain import Terrain
 
 from .body import Body
 from .displacement import Displacement
-from .senses import Readings, Senses
+from .sense_models import Senses
+from .senses import Readings
 from .steering.navigator import Journey, Motion
 from .stop_check import StopCheck
 from .stopping import StoppingRules, StopReason
