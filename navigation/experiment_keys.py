@@ -43,7 +43,7 @@ ROUTE_SETTINGS = (
 VIEW_SETTINGS = (  # decide with these the views that are learned
     "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "mask", "threads",
     "encoding", "resize", "blur", "spacing_m", "every", "learning_walk_m", "parallel_views",
-    "goal_walk_m", "goal_views", "goal_spread_deg", "goal_only",
+    "goal_walk_m", "goal_turns", "goal_views", "goal_spread_deg", "goal_only",
 )  # fmt: skip
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "collisions", "body_radius_m", "release_m", "release_deg",
@@ -54,7 +54,9 @@ WALK_FIELDS = tuple(
     {FIELDS[name].partition(".")[0]: None for name in WALK_SETTINGS if name in FIELDS}
 )  # of an experiment, likewise
 _WALK = attrgetter(*WALK_FIELDS)
-_REST = attrgetter(*(each.name for each in attrs.fields(Experiment) if each.name not in WALK_FIELDS))
+_REST = attrgetter(  # senses decide where views are learned, too
+    *(each.name for each in attrs.fields(Experiment) if each.name not in WALK_FIELDS), "body.senses"
+)
 MAX_KNOWN = 10_000  # parts that keys are made of in memory, of some kB each
 
 

@@ -1,3 +1,7 @@
+from .average_landmark_vector import AverageLandmarkVector as AverageLandmarkVector
+from .home_vector import HomeVector as HomeVector
+from .homing import Homing as Homing
+from .image_gradient import ImageGradient as ImageGradient
 from .navigator import Look as Look
 from .navigator import Motion as Motion
 from .navigator import Navigator as Navigator

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import columns_of_turn
@@ -66,7 +66,7 @@ class Memory:
         return (self.familiar - self.familiarity(views)) / max(self.familiar - self.unfamiliar, np.finfo(float).tiny)
 
 
-def turned(views: Images, angles: Sequence[float]) -> Images:
+def turned(views: Images, angles: Sequence[float]) -> Float32[torch.Tensor, "m h w"]:
     """Views (n, h, w) as they are seen after turning left by each angle (rad), rounded to whole columns: (n k, h, w), a view's together."""
     columns = [round(float(columns_of_turn(angle, views.shape[2]))) for angle in angles]
     return torch.stack([views.roll(each, dims=2) for each in columns], dim=1).flatten(0, 1)

@@ -11,5 +11,9 @@ NAVIGATORS = Registry(
         "scan": f"{_HERE}.scan:Scan",
         "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan",
         "lateral": f"{_HERE}.lateral:Lateral",
+        "homing": f"{_HERE}.homing:Homing",
+        "average-landmark-vector": f"{_HERE}.average_landmark_vector:AverageLandmarkVector",
+        "image-gradient": f"{_HERE}.image_gradient:ImageGradient",
+        "home-vector": f"{_HERE}.home_vector:HomeVector",
     },
 )

@@ -1,0 +1,57 @@
+"""Average landmark vector: one vector sums up a view, and its difference from that of the goal's view leads home."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+from jaxtyping import Float
+
+from tussock.world.geometry import column_azimuths, wrap_angle
+from tussock.world.settings import settings
+
+from .navigator import Images, Look, Motion
+from .places import Places, index_of_goal, needs_places
+
+
+@settings
+class AverageLandmarkVector:
+    """Walks along the difference between the average landmark vector of the view and that of the goal's view.
+
+        home = v(now) - v(goal),    v = sum of c u / sum of c
+
+    where u is the unit vector, by the compass, in which a column of the encoded view looks, and c is the largest |pixel| of that column:
+    what stands out is a landmark, an edge say, and counts once, however high it is. Seen from the east of the goal, landmarks around it appear farther to the west, so
+    that the difference points home. Lambrinos D, Möller R, Labhart T, Pfeifer R, Wehner R (2000). A mobile robot employing insect
+    strategies for navigation. Robotics and Autonomous Systems 30, 39-64.
+    """
+
+    goal: Float[np.ndarray, "2"] = attrs.field(init=False)
+
+    def learn(self, views: Images) -> None:
+        """Refuse views without places. Raises SettingError."""
+        raise needs_places("average-landmark-vector")
+
+    def learn_at(self, views: Images, places: Places) -> None:
+        """Learn the vector of the view (n, h, w) that was seen nearest to the goal."""
+        at = index_of_goal(places)
+        object.__setattr__(self, "goal", average_landmark_vectors(views[at : at + 1], places[at : at + 1, 2])[0])
+
+    def begin(self) -> None:
+        """An agent remembers nothing from look to look."""
+
+    def decide(self, look: Look, memories: Sequence[Any]) -> Motion:
+        """Turn each agent along its difference."""
+        home = average_landmark_vectors(look.views, look.compass) - self.goal
+        turn = np.where(home.any(axis=1), wrap_angle(np.arctan2(home[:, 1], home[:, 0]) - look.compass), 0.0)
+        return Motion(turn=turn, signals={"home_x": home[:, 0], "home_y": home[:, 1]})
+
+
+def average_landmark_vectors(views: Images, headings: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
+    """The average landmark vectors of views (n, h, w) that face headings (rad), east and north; 0 of views that show nothing."""
+    azimuths = column_azimuths(views.shape[2])
+    vectors = []
+    for view, heading in zip(views.abs().double().cpu().numpy(), headings, strict=True):
+        weights, directions = view.max(axis=0), azimuths + heading
+        vectors.append(np.array([weights @ np.cos(directions), weights @ np.sin(directions)]) / max(weights.sum(), 1e-12))
+    return np.reshape(vectors, (-1, 2))
