@@ -67,7 +67,7 @@ def compare_models(
         training_views(encoding, renderer, each.training_poses(renderer.world, route))
         for each in (on_route, experiment)
     )
-    senses = experiment.body.senses.make()
+    senses = experiment.senses.make()
     route_views, poses = route_views_of(experiment, route), facing_east(positions)
     views = list(encoded_views(encoding, renderer, poses))
     for spec in models:

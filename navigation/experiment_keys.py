@@ -54,9 +54,7 @@ WALK_FIELDS = tuple(
     {FIELDS[name].partition(".")[0]: None for name in WALK_SETTINGS if name in FIELDS}
 )  # of an experiment, likewise
 _WALK = attrgetter(*WALK_FIELDS)
-_REST = attrgetter(  # senses decide where views are learned, too
-    *(each.name for each in attrs.fields(Experiment) if each.name not in WALK_FIELDS), "body.senses"
-)
+_REST = attrgetter(*(each.name for each in attrs.fields(Experiment) if each.name not in WALK_FIELDS))
 MAX_KNOWN = 10_000  # parts that keys are made of in memory, of some kB each
 
 

@@ -11,7 +11,7 @@ from tussock.navigation.experiment_keys import Keys, key_of
 from tussock.navigation.learning import learn_views
 from tussock.navigation.senses import ANT, Readings, Senses, measured_places
 from tussock.navigation.steering import NAVIGATORS
-from tussock.navigation.steering.average_landmark_vector import AverageLandmarkVector, average_landmark_vectors
+from tussock.navigation.steering.average_landmark_vector import AverageLandmarkVector
 from tussock.navigation.steering.home_vector import HomeVector, Network, units_within, ways_home, weights_of
 from tussock.navigation.steering.homing import Homing
 from tussock.navigation.steering.image_gradient import ImageGradient
@@ -26,7 +26,9 @@ from tussock.world.scene import Ground, World
 
 LEARNING_PLACES = ("homing", "average-landmark-vector", "image-gradient", "home-vector")
 WIDTH = 72
-POSTS = np.array([[3.0, 0.13], [-1.5, 2.5], [-1.0, -3.0], [0.5, 4.0], [2.0, -2.1]])  # m; none at the edge of a column of 5 degrees
+POSTS = np.array(
+    [[3.0, 0.13], [-1.5, 2.5], [-1.0, -3.0], [0.5, 4.0], [2.0, -2.1]]
+)  # m; none at the edge of a column of 5 degrees
 
 
 class Placed(Ahead):
@@ -151,7 +153,7 @@ def test_views_without_places_are_refused(name):
 
 def test_senses_are_in_the_keys_of_a_sweep():
     """They decide where views are believed to be, and how a walk reads its compass."""
-    sweep = Sweep.over("senses", Experiment(world="tiny"), {"senses": [{"body__senses": each} for each in ("ideal", "ant")]})
+    sweep = Sweep.over("senses", Experiment(world="tiny"), {"senses": ["ideal", "ant"]})
     keys = Keys()
     assert [keys.run(run) for run in sweep.experiments] == [key_of(run) for run in sweep.experiments]
     assert len({keys.run(run) for run in sweep.experiments}) == 2
@@ -162,12 +164,16 @@ def test_senses_are_in_the_keys_of_a_sweep():
 
 
 def test_an_average_landmark_vector_by_hand():
-    view = torch.zeros(1, 2, 8)
-    view[0, 0, 2], view[0, 1, 2], view[0, 1, 5] = -3.0, 1.0, 1.0
-    azimuths = column_azimuths(8) + 0.4
-    expected = (3 * np.cos(azimuths[2]) + np.cos(azimuths[5])) / 4, (3 * np.sin(azimuths[2]) + np.sin(azimuths[5])) / 4
-    np.testing.assert_allclose(average_landmark_vectors(view, np.array([0.4]))[0], expected)
-    assert (average_landmark_vectors(torch.zeros(1, 2, 8), np.zeros(1)) == 0).all()
+    """Landmarks at columns 2, 5 and, half each, 11 and 0; the weak one at 9 does not count."""
+    view = torch.zeros(1, 2, 12)
+    view[0, 0, 2], view[0, 1, 2], view[0, 1, 9] = -3.0, 1.0, 0.2
+    view[0, 1, 5], view[0, 0, 11], view[0, 1, 0] = 1.0, 2.0, -2.0
+    azimuths = column_azimuths(12) + 0.4
+    weights = {2: 1.0, 5: 1.0, 11: 0.5, 0: 0.5}
+    expected = [sum(w * f(azimuths[k]) for k, w in weights.items()) / 3 for f in (np.cos, np.sin)]
+    navigator = AverageLandmarkVector(contrast=0.3)
+    np.testing.assert_allclose(navigator.vectors(view, np.array([0.4]))[0], expected)
+    assert (navigator.vectors(torch.zeros(1, 2, 8), np.zeros(1)) == 0).all()
 
 
 def test_average_landmark_vectors_lead_home_among_posts_whichever_way_agents_face():

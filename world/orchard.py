@@ -10,7 +10,11 @@ from .params import WorldParams
 from .plants import tree
 from .scene import Ground, World
 
-CLEAR, AROUND, MAX_AROUND = 5.0, 10.0, 3  # no tree within CLEAR of the middle (m), and at most MAX_AROUND within AROUND (m)
+CLEAR, AROUND, MAX_AROUND = (
+    5.0,
+    10.0,
+    3,
+)  # no tree within CLEAR of the middle (m), and at most MAX_AROUND within AROUND (m)
 GROUND_MARGIN = 400.0  # m beyond the field
 ATTEMPTS = 100_000
 
@@ -45,7 +49,14 @@ def orchard(seed: int, trees: int = 15, reach: float = 50.0, apart: float = 5.0,
         ground=Ground((150, 158, 96), field.widened(GROUND_MARGIN)),
         sky_rgb=params.sky_rgb,
         field=field,
-        origin={"preset": "orchard", "seed": int(seed), "trees": trees, "reach": reach, "apart": apart, "height": height},
+        origin={
+            "preset": "orchard",
+            "seed": int(seed),
+            "trees": trees,
+            "reach": reach,
+            "apart": apart,
+            "height": height,
+        },
     )
 
 
@@ -60,4 +71,6 @@ def _positions(trees: int, reach: float, apart: float, land: np.random.Generator
         crowded = middle < AROUND and (np.hypot(*kept.T) < AROUND).sum() >= MAX_AROUND
         if middle >= CLEAR and not crowded and (np.hypot(*(kept - xy).T) >= apart).all():
             kept = np.vstack([kept, xy])
-    raise SettingError(f"no room for {trees} trees within {reach:g} m and {apart:g} m apart; give fewer, or less distance")
+    raise SettingError(
+        f"no room for {trees} trees within {reach:g} m and {apart:g} m apart; give fewer, or less distance"
+    )

@@ -1,5 +1,7 @@
 """Homing: a scan for what looks familiar, after learning all views as they look towards the goal."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from tussock.world.settings import settings
@@ -18,6 +20,8 @@ class Homing(Scan):
     familiar heading is that of the goal, as with nest-centred memories of ants: Graham P, Philippides A, Baddeley B (2010).
     Animal cognition: multi-modal interactions in ant learning. Current Biology 20, R639-R640.
     """
+
+    takes_trained: ClassVar[bool] = False
 
     def learn(self, views: Images) -> None:
         """Refuse views without places. Raises SettingError."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
+from typing import ClassVar
 
 import attrs
 import numpy as np
@@ -43,6 +44,8 @@ class ImageGradient:
         angle: Turn when the difference has not fallen (rad).
         first: To which side.
     """
+
+    takes_trained: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     angle: float = number(radians(90.0), above=0, high=np.pi, unit="rad")

@@ -15,5 +15,9 @@ NAVIGATORS = Registry(
         "average-landmark-vector": f"{_HERE}.average_landmark_vector:AverageLandmarkVector",
         "image-gradient": f"{_HERE}.image_gradient:ImageGradient",
         "home-vector": f"{_HERE}.home_vector:HomeVector",
+        "path-integration": f"{_HERE}.path_integration:PathIntegration",
+        "central-complex": f"{_HERE}.central_complex:CentralComplexSteering",
+        "blend": f"{_HERE}.blend:Blend",
+        "loop-breaker": f"{_HERE}.loop_breaker:LoopBreaker",
     },
 )
