@@ -209,10 +209,10 @@ def test_the_difference_depends_on_the_place_alone():
     flight = np.array([[0.0, 0.0, np.radians(30)]])
     navigator.learn_at(views_of(flight), flight)
     poses = np.array([[0.4, 0.3, heading] for heading in np.radians([0, 35, -95, 170])])
-    difference = decided(navigator, look_at(poses)).signals["unfamiliarity"]
+    difference = decided(navigator, look_at(poses)).signals["difference"]
     np.testing.assert_allclose(difference, difference[0], atol=1e-6)
     here = np.array([[0.0, 0.0, np.radians(-60)]])
-    assert decided(navigator, look_at(here)).signals["unfamiliarity"][0] == pytest.approx(0, abs=1e-6)
+    assert decided(navigator, look_at(here)).signals["difference"][0] == pytest.approx(0, abs=1e-6)
 
 
 # ------------------------------------------------------------------------------------------------- homing

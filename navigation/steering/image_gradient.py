@@ -34,13 +34,14 @@ class LastLook:
 class ImageGradient:
     """Descends in the difference of its view from the goal's: goes straight on while it falls, and turns when it does not.
 
-    Each view is turned, by the compass, to the direction that the goal's view faces, so that only the place makes a difference. Zeil J,
+    Each view is turned, by the compass, to the direction that the goal's view faces, so that only the place makes a difference; an
+    agent that does not see all around turns there to look. Zeil J,
     Hofmann MI, Chahl JS (2003). Catchment areas of panoramic snapshots in outdoor scenes. Journal of the Optical Society of
     America A 20, 450-469: the difference grows smoothly with the distance from the goal, and a robot that always turns by 90 degrees
     to the same side finds the goal.
 
     Attributes:
-        model: Learns the goal's view; its unfamiliarity is the difference.
+        model: Learns the goal's view; the difference is how much less familiar a view is.
         angle: Turn when the difference has not fallen (rad).
         first: To which side.
     """
@@ -69,12 +70,15 @@ class ImageGradient:
 
     def decide(self, look: Look, memories: Sequence[LastLook]) -> Motion:
         """Go on with each agent whose difference has fallen, and turn the others."""
-        difference = self.memory.unfamiliarity(turned_each(look.views, self.facing - look.compass))
+        views = turned_each(look.views, self.facing - look.compass)
+        difference = self.memory.familiar - self.memory.familiarity(views)
         fallen = difference < [memory.difference for memory in memories]
         for memory, now in zip(memories, difference.tolist(), strict=True):
             memory.difference = now
         side = 1 if self.first == "left" else -1
-        return Motion(turn=np.where(fallen, 0.0, side * self.angle), signals={"unfamiliarity": difference})
+        turn = np.where(fallen, 0.0, side * self.angle)
+        looks = None if getattr(self.model, "mask", None) is None else np.full(len(look), 2)  # it turns to look, and on
+        return Motion(turn=turn, looks=looks, signals={"difference": difference})
 
 
 def turned_each(views: Images, angles: Float[np.ndarray, " n"]) -> Images:
