@@ -98,7 +98,7 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the model {str(self.model)!r} lacks fit(views) or scan(views); name a familiarity model"
                 )
-            if not isinstance(self.navigator.make(model=model), Navigator):
+            if not isinstance(self.make_navigator(model), Navigator):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
@@ -135,6 +135,10 @@ class Experiment(Surroundings):
             raise SettingError(f"{self.model} is a trained model; give a model's name")
         return seeing(self.model.make(seed=self.seed, device=self.device), self.encoding.for_eye(self.eye).mask)
 
+    def make_navigator(self, model: "FamiliarityModel") -> Any:
+        """The navigator, with a model that it may take."""
+        return self.navigator.make(model=model, seed=self.seed)
+
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
         from tussock.world.geometry import Pose
@@ -162,6 +166,7 @@ class Experiment(Surroundings):
             model: An untrained model to take in place of the experiment's, told what the eye sees.
             views: The training views, as `training_views` gives them, where they are drawn already.
         """
+        from .learning import learn_views
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
@@ -172,12 +177,13 @@ class Experiment(Surroundings):
             if model is None and isinstance(self.model, Path):
                 loaded = load_model(self.model, device=self.device)
                 self.check_matches(loaded)
-                navigator = self.navigator.make(model=loaded.model)
+                navigator = self.make_navigator(loaded.model)
                 images, poses = None, loaded.poses
             else:
-                navigator = self.navigator.make(model=self.make_model() if model is None else model)
+                navigator = self.make_navigator(self.make_model() if model is None else model)
                 images, poses = views or self.training_views(renderer, route, progress)
-                navigator.learn(images.clone())  # others learn them, too, and a model of the user's may change them
+                own = images.clone()  # others learn them, too, and a model of the user's may change them
+                learn_views(navigator, own, poses, route=route, senses=self.senses.make(), seed=self.seed)
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):

@@ -187,6 +187,8 @@ class LearningOptions(SourceOptions):
     """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
     goal_walk_m: float = default(TrainingSetup, "goal_walk")
     """Also learn views on a spiral about the end of the route, from 0.1 m to this far away, that face the end; 0 is none."""
+    goal_turns: float = default(TrainingSetup, "goal_turns")
+    """Number of turns of this spiral."""
     goal_views: int = default(TrainingSetup, "goal_views")
     """Number of views on this spiral."""
     goal_spread_deg: float = degrees(default(TrainingSetup, "goal_spread"))
