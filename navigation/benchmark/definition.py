@@ -43,7 +43,8 @@ ENCODING = "edges"  # of entries that choose none
 EARLY = {"world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m"}  # as old as the benchmarks
 # Settings newer than the benchmarks: where they are as by default, the digest is as it was before them.
 LATER = {
-    *ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m", "goal_walk_m", "goal_views", "goal_spread_deg", "goal_only",
+    *ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m", "goal_walk_m", "goal_turns", "goal_views",
+    "goal_spread_deg", "goal_only",
     "collisions", "body_radius_m", "senses", "release_m", "release_deg", "displace_at", "displace_m",
 } - EARLY  # fmt: skip
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
