@@ -13,7 +13,6 @@ from tussock.render.eye import Eye
 
 from ..body import Body
 from ..experiment import Experiment
-from ..experiment_keys import ROUTE_SETTINGS
 from ..experiment_settings import TYPES, settings_of
 from ..stopping import StoppingRules
 from ..sweeps.spec import Sweep
@@ -39,9 +38,12 @@ BASE = Experiment(
     threads=1,
 )
 ENCODING = "edges"  # of entries that choose none
-EARLY = {"world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m"}  # as old as the benchmarks
-# Settings newer than the benchmarks: where they are as by default, the digest is as it was before them.
-LATER = {*ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m"} - EARLY
+EARLY = {  # settings as old as the benchmarks
+    "world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m",
+    "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "resize", "blur", "spacing_m", "every", "learning_walk_m",
+    "device", "threads", "step_m", "scan_deg", "scan_about_deg", "on_lost", "waypoint_m", "arrive_m", "lost_m", "patience_m", "max_steps",
+}  # fmt: skip
+LATER = set(TYPES) - EARLY  # where these are as by default, the digest is as it was before them
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
 
 
