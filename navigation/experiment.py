@@ -26,6 +26,7 @@ from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
 from .experiment_fields import as_encoding, as_model, as_navigator
+from .sense_models import as_senses
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -58,6 +59,7 @@ class Experiment(Surroundings):
         model: What tells how familiar a view is: a spec, such as "infomax rate=baddeley", or a file of a trained model.
         training: Which views are learned. A model from a file has learned already.
         body: How the agent moves.
+        senses: How well the agent measures its heading and the distance that it walks: a spec, such as "ant" (see sense_models.py).
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
         release: The walk starts this far from the route's end instead (m), facing it. 0: at the route's start.
         release_direction: In which direction of the world from there (rad, counter-clockwise from east).
@@ -71,6 +73,7 @@ class Experiment(Surroundings):
     model: Spec | Path = converted(default="perfect-memory", converter=as_model)
     training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
+    senses: Spec = converted(default="ideal", converter=as_senses)
     start_offset: float = number(0.0, unit="m")
     release: float = number(0.0, low=0, unit="m")
     release_direction: float = number(0.0, unit="rad")
@@ -80,6 +83,7 @@ class Experiment(Surroundings):
 
     def __attrs_post_init__(self):
         from .models.base import FamiliarityModel
+        from .models.random import RandomHeadings
         from .steering.navigator import Navigator
 
         super().__attrs_post_init__()
@@ -94,7 +98,7 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the model {str(self.model)!r} lacks fit(views) or scan(views); name a familiarity model"
                 )
-            if not isinstance(self.navigator.make(model=model), Navigator):
+            if not isinstance(self.make_navigator(model), Navigator):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
@@ -104,7 +108,7 @@ class Experiment(Surroundings):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"
             )
-        elif not getattr(self.navigator.target, "takes_trained", True):
+        elif not getattr(self.navigator.make(model=RandomHeadings()), "takes_trained", True):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} learns views that face in other directions than those of a trained model, so it "
                 f"cannot use {self.model}; give a model's name"
@@ -130,6 +134,10 @@ class Experiment(Surroundings):
         if isinstance(self.model, Path):
             raise SettingError(f"{self.model} is a trained model; give a model's name")
         return seeing(self.model.make(seed=self.seed, device=self.device), self.encoding.for_eye(self.eye).mask)
+
+    def make_navigator(self, model: "FamiliarityModel") -> Any:
+        """The navigator, with a model that it may take."""
+        return self.navigator.make(model=model, seed=self.seed)
 
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
@@ -158,6 +166,7 @@ class Experiment(Surroundings):
             model: An untrained model to take in place of the experiment's, told what the eye sees.
             views: The training views, as `training_views` gives them, where they are drawn already.
         """
+        from .learning import learn_views
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
@@ -168,12 +177,13 @@ class Experiment(Surroundings):
             if model is None and isinstance(self.model, Path):
                 loaded = load_model(self.model, device=self.device)
                 self.check_matches(loaded)
-                navigator = self.navigator.make(model=loaded.model)
+                navigator = self.make_navigator(loaded.model)
                 images, poses = None, loaded.poses
             else:
-                navigator = self.navigator.make(model=self.make_model() if model is None else model)
+                navigator = self.make_navigator(self.make_model() if model is None else model)
                 images, poses = views or self.training_views(renderer, route, progress)
-                navigator.learn(images.clone())  # others learn them, too, and a model of the user's may change them
+                own = images.clone()  # others learn them, too, and a model of the user's may change them
+                learn_views(navigator, own, poses, route=route, senses=self.senses.make(), seed=self.seed)
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):
@@ -186,6 +196,7 @@ class Experiment(Surroundings):
             poses=poses,
             views=images if images is None or trained is None else shared_views(model, images),
             seconds=time.perf_counter() - began,
+            encoding=self.encoding,
         )
 
     def training_views(self, renderer: "Renderer", route: "Route", progress: Progress = no_progress) -> "TrainingViews":
@@ -264,6 +275,7 @@ def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Rou
         body=[each.body for each in experiments],
         stopping=[each.stopping for each in experiments],
         displacement=[each.displacement for each in experiments],
+        senses=[each.senses.make() for each in experiments],
         noise=[default_rng(each.seed) for each in experiments],
     )
 

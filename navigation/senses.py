@@ -9,6 +9,8 @@ from tussock.world.geometry import wrap_angle
 
 from .sense_models import Senses
 
+READING = 0.5  # s between readings on a learning walk, as in Bee-Nav's simulation
+
 
 @dataclass
 class Readings:
@@ -41,3 +43,27 @@ class Readings:
 
     def _normal(self, count: int) -> Float[np.ndarray, " count"]:
         return self.random.standard_normal(count)
+
+
+def measured_places(
+    poses: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "2"], readings: Readings
+) -> Float[np.ndarray, "n 3"]:
+    """Where an agent that walks from its goal through poses, straight from each to the next, believes that they are.
+
+    It sums up the way by its compass and its odometer, which it reads every READING seconds.
+
+    Args:
+        poses: (n, 3) In the order of the walk (m, m, rad).
+        goal: (2,) Where the walk begins (m).
+        readings: The agent's compass and odometer.
+
+    Returns:
+        (n, 3) Of each pose: east and north of the goal (m), and the heading (rad).
+    """
+    legs = np.diff(np.vstack([goal, poses[:, :2]]), axis=0)
+    lengths, directions = np.hypot(*legs.T), np.arctan2(legs[:, 1], legs[:, 0])
+    parts = np.maximum(1, np.ceil(lengths / (READING * readings.senses.speed)).astype(int))
+    last = parts.cumsum() - 1  # part of each leg
+    heading, distance = readings.read(directions.repeat(parts), (lengths / parts).repeat(parts))
+    way = np.cumsum(distance[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    return np.column_stack([way[last], wrap_angle(poses[:, 2] + heading[last] - directions)])

@@ -20,6 +20,7 @@ from tussock.navigation.encoding import Encoding
 from tussock.navigation.experiment import Experiment, steps_of
 from tussock.navigation.models import MODELS
 from tussock.navigation.models.files import save_model
+from tussock.navigation.models.random import RandomHeadings
 from tussock.navigation.steering import NAVIGATORS
 from tussock.navigation.steering.navigator import Journey, Look, Motion, Navigator, PathIntegrating
 from tussock.navigation.stopping import StoppingRules
@@ -393,7 +394,7 @@ def model_file(tmp_path_factory) -> Path:
 
 def test_a_model_from_a_file_steers_or_is_refused_in_one_line(name, model_file):
     target = NAVIGATORS.find(name)
-    if not (takes(target, "model") and getattr(target, "takes_trained", True)):
+    if not (takes(target, "model") and getattr(spec(name).make(model=RandomHeadings()), "takes_trained", True)):
         with pytest.raises(SettingError) as refused:
             experiment(name, model=model_file)
         assert all(word in str(refused.value) for word in (repr(name), str(model_file)))

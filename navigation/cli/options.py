@@ -187,6 +187,8 @@ class LearningOptions(SourceOptions):
     """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
     goal_walk_m: float = default(TrainingSetup, "goal_walk")
     """Also learn views on a spiral about the end of the route, from 0.1 m to this far away, that face the end; 0 is none."""
+    goal_turns: float = default(TrainingSetup, "goal_turns")
+    """Number of turns of this spiral."""
     goal_views: int = default(TrainingSetup, "goal_views")
     """Number of views on this spiral."""
     goal_spread_deg: float = degrees(default(TrainingSetup, "goal_spread"))
@@ -232,7 +234,7 @@ class RunOptions(ModelOptions):
     """What plants and stones do to a step: let it pass through, stop it where the body touches one, or let it slide along."""
     body_radius_m: float = default(Body, "radius")
     """Radius of the body, which may not enter what it touches."""
-    senses: str = default(Body, "senses")
+    senses: str = default(Experiment, "senses")
     """How well the agent measures its heading and the distance it walks: ideal, robot, svo-gtsam, stankiewicz-webb, ant or bee, with their
     published noise; parameters may follow, as in 'ant compass_deg=10 speed=0.2'."""
     release_m: float = default(Experiment, "release")

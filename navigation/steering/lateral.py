@@ -46,6 +46,11 @@ class Lateral:
     left: Memory = attrs.field(init=False)
     right: Memory = attrs.field(init=False)
 
+    @property
+    def models(self) -> tuple[FamiliarityModel, FamiliarityModel]:
+        """What both memories have learned."""
+        return self.left.model, self.right.model
+
     def learn(self, views: Images) -> None:
         """Learn views (n, h, w) turned to both sides."""
         for name, side in (("left", 1.0), ("right", -1.0)):
@@ -59,4 +64,5 @@ class Lateral:
         left, right = self.left.unfamiliarity(look.views), self.right.unfamiliarity(look.views)
         turn = (self.gain * (left - right)).clip(-self.max_turn, self.max_turn)
         step = (1 - self.slowing * np.minimum(left, right)).clip(self.slowest, 1.0)
-        return Motion(turn=turn, step=step, signals={"left": left, "right": right})
+        certainty = (1 - np.minimum(left, right)).clip(0, 1)
+        return Motion(turn=turn, step=step, certainty=certainty, signals={"left": left, "right": right})
