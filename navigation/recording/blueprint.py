@@ -96,7 +96,7 @@ def _agent_views(max_deviation: float, shown: Shown) -> rrb.Vertical:
         views.append((1.3, rrb.TimeSeriesView(origin=LINES, name="What it steers by", plot_legend=legend)))
     if shown.maps:
         maps = [
-            rrb.TensorView(origin=entity(MAPS, name), name=f"{name}, now on the right", view_fit="FillKeepAspectRatio")
+            rrb.TensorView(origin=entity(MAPS, name), name=f"{name}, now on the right", view_fit="Fill")
             for name in shown.maps
         ]
         views.append((1.3, rrb.Horizontal(*maps)))
