@@ -1,3 +1,5 @@
+from .cast_and_surge import CastAndSurge as CastAndSurge
+from .familiarity_modulated import FamiliarityModulated as FamiliarityModulated
 from .navigator import Look as Look
 from .navigator import Motion as Motion
 from .navigator import Navigator as Navigator

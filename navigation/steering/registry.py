@@ -13,5 +13,7 @@ NAVIGATORS = Registry(
         "lateral": f"{_HERE}.lateral:Lateral",
         "blend": f"{_HERE}.blend:Blend",
         "loop-breaker": f"{_HERE}.loop_breaker:LoopBreaker",
+        "familiarity-modulated": f"{_HERE}.familiarity_modulated:FamiliarityModulated",
+        "cast-and-surge": f"{_HERE}.cast_and_surge:CastAndSurge",
     },
 )
