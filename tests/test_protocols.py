@@ -39,6 +39,7 @@ from tussock.navigation.studies.protocols.ardin2016_published import share_of_th
 from tussock.navigation.studies.protocols.azevedo2025 import of_walk
 from tussock.navigation.studies.protocols.effects import over_routes
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
+from tussock.navigation.sweeps.tables import compared_models
 from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
@@ -315,6 +316,26 @@ def test_azevedos_strategies_are_compared_within_worlds(cast, expected):
     decided = holds(AZEVEDO2025, results)
     assert decided["cast-and-surge-converges"] is expected
     assert decided["cast-and-surge-ends-closer"] is expected
+
+
+def test_a_protocol_of_several_navigators_compares_these():
+    table = walks(
+        spec="perfect-memory",
+        model="perfect-memory",
+        navigator=["scan", "cast-and-surge"] * 6,
+        world="tiny",
+        seed=0,
+        route=None,
+        route_seed=np.repeat(range(6), 2),
+        world_seed=np.repeat(range(6), 2),
+        mean_deviation_m=[0.3, 0.1] * 6,
+    )
+    compared = compared_models(table, "navigator")
+    deviation = {name: each["mean_deviation_m"]["value"] for name, each in compared["navigators"].items()}
+    assert deviation == {"scan": pytest.approx(0.3), "cast-and-surge": pytest.approx(0.1)}
+    (pair,) = compared["pairs"]
+    assert (pair["first"], pair["second"], pair["better"]["mean_deviation_m"]) == ("cast-and-surge", "scan", 6)
+    assert list(compared_models(table)["models"]) == ["perfect-memory"]
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from ...training_setup import TrainingSetup
 from .effects import over_routes
 from .figures import lines_by_model
 from .intervals import INTERVALS, intervals
-from .protocol import Item, Parameter, Protocol
+from .protocol import Item, Parameter, Protocol, models_in
 
 MAX_START, STARTS = 5.5, 45  # m to either side of the route; number of starts from one side to the other
 SECOND_START, SECOND_WORLDS = 2.0, 10  # of the second set of starts: m to either side, and worlds
@@ -79,7 +79,7 @@ def measure(walks: pd.DataFrame) -> StudyResults:
         },
         numbers={
             f"{label}, {name}": float(means.loc[name, column])
-            for name in means.index
+            for name in models_in(walks)
             for column, label in MEASURES.items()
         },
     )
