@@ -35,7 +35,7 @@ class Bump(Model):
 
     def _scan(self, views):
         ahead = torch.stack([views[:, 0].roll(k, dims=1)[:, views.shape[2] // 2] for k in range(views.shape[2])], dim=1)
-        return -(1 - ahead * (1 - views[:, 1]))
+        return -torch.where(ahead > 0, views[:, 1], views[:, 1].clamp(min=1))
 
 
 def learned(navigator_class, **parameters):
@@ -126,8 +126,14 @@ def test_a_scan_is_centred_on_the_way():
 
 def test_familiarity_between_shows_no_way():
     agent = Caster(learned(CastAndSurge))
-    assert agent.go(0.84, way_deg=15) == 15
-    assert agent.go(0.86, way_deg=15) == 15 + CAST
+    assert agent.go(0.79, way_deg=15) == 15
+    assert agent.go(0.81, way_deg=15) == 15 + CAST
+
+
+def test_what_is_familiar_depends_on_the_most_unfamiliar_view():
+    agent = Caster(learned(CastAndSurge, leg=9.0))
+    assert [agent.go(unfamiliarity) for unfamiliarity in (0.95, 1.5, 1.25)] == [CAST] * 3
+    assert agent.go(0.95, way_deg=15) == 15
 
 
 @pytest.mark.parametrize("navigator_class", [CastAndSurge, FamiliarityModulated])

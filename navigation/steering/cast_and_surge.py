@@ -25,12 +25,13 @@ TOLERANCE = 1e-6  # m; so that legs have the same number of steps whatever their
 class CastAndSurge:
     """Surges along the way that a familiar view shows; where no view is familiar, casts across it to alternate sides.
 
-        surge, where the best view of a scan has an unfamiliarity under `known`: the way is its heading; walk along it
+        surge, where the best view of a scan has an unfamiliarity under known x greatest: the way is its heading; walk along it
         cast, elsewhere: walk at way + side x angle, for a leg of some metres; then the other side, and a leg `growth` times as long
 
     A cast goes on past its leg while familiarity rises, which is while unfamiliarity is lower by `rise` than its running mean: so it
     climbs towards familiar views. A surge ends the search, and the next one begins with a short leg. Scans are centred on the way, as
-    the agent's compass keeps it, because a cast leads away from it.
+    the agent's compass keeps it, because a cast leads away from it. `greatest` is the greatest unfamiliarity that the agent has met in
+    this walk, at least 1: how unfamiliar views are off the route differs from world to world.
 
     Azevedo Amin et al. (2025) take from olfactory navigation that casts are a zig-zag in space in search of familiar views, and that
     surges follow familiarity. The rules, the compass and all numbers here but the width of the scan are chosen by us.
@@ -38,7 +39,7 @@ class CastAndSurge:
     Attributes:
         model: What tells how familiar a view is at each rotation.
         width: Full width of the scan (rad).
-        known: Unfamiliarity under which a view shows the way: 0 as of learned views, 1 as of views that face the other way.
+        known: Unfamiliarity under which a view shows the way, in the greatest one; 0 as of learned views.
         angle: Between the way and a cast (rad).
         leg: Length of the first cast (m).
         growth: Length of each further cast, in those of the one before.
@@ -49,7 +50,7 @@ class CastAndSurge:
 
     model: FamiliarityModel = attrs.field()
     width: float = number(radians(160.0), above=0, high=2 * np.pi, unit="rad")
-    known: float = number(0.85, above=0)
+    known: float = number(0.8, above=0, high=1)
     angle: float = number(radians(75.0), above=0, high=np.pi, unit="rad")
     leg: float = number(0.5, above=0, unit="m")
     growth: float = number(2.0, low=1)
@@ -109,7 +110,7 @@ class CastAndSurge:
             walked: Since the look before (m).
         """
         rising = memory.take_in(unfamiliarity, self.smoothing) > self.rise
-        if unfamiliarity < self.known:
+        if unfamiliarity < self.known * memory.greatest:
             memory.way, memory.casting, memory.leg = float(wrap_angle(read)), False, self.leg
             return memory.way
         assert memory.way is not None
@@ -132,6 +133,7 @@ class Casting:
         casting: Whether it casts.
         walked: Of the present cast (m).
         usual: Running mean of unfamiliarity; None before its first look.
+        greatest: The greatest unfamiliarity so far, at least 1.
     """
 
     following: Following | None
@@ -141,9 +143,11 @@ class Casting:
     casting: bool = False
     walked: float = 0.0
     usual: float | None = None
+    greatest: float = 1.0
 
     def take_in(self, unfamiliarity: float, weight: float) -> float:
-        """Add a look to the running mean; how far its unfamiliarity is below what was usual before it."""
+        """Add a look to the running mean and the greatest; how far its unfamiliarity is below what was usual before it."""
+        self.greatest = max(self.greatest, unfamiliarity)
         before = unfamiliarity if self.usual is None else self.usual
         self.usual = before + weight * (unfamiliarity - before)
         return before - unfamiliarity
