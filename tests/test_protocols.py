@@ -303,7 +303,7 @@ def test_azevedos_strategies_are_compared_within_worlds(cast, expected):
     assert list(dict.fromkeys(results.tables["walks"]["model"])) == [
         "view-based orientation",
         "cast and surge",
-        "lateral (ours)",
+        "lateral",
     ]
     differences = results.tables["differences"].set_index(["starts", "measure", "strategy"])
     row = differences.loc["all starts", "mean displacement (m)", "cast and surge"]

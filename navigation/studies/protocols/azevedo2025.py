@@ -34,7 +34,7 @@ MEASURES = {
     "reached": "share that got to the last 5 %",
 }
 BY_VIEW, MODULATED, CAST, LATERAL = (
-    "view-based orientation", "familiarity-based modulation", "cast and surge", "lateral (ours)"
+    "view-based orientation", "familiarity-based modulation", "cast and surge", "lateral"
 )  # fmt: skip
 STRATEGIES = {  # their navigators; by their first word
     "scan": BY_VIEW, "familiarity-modulated": MODULATED, "cast-and-surge": CAST, "lateral": LATERAL,
@@ -199,7 +199,7 @@ PARAMETERS = (
     Parameter(
         "Starts", "45, up to 5.5 m to both sides", "45, every 0.25 m from 5.5 m on one side to 5.5 m on the other"
     ),
-    Parameter("Strategies", f"{BY_VIEW}, {MODULATED}, {CAST}", f"the same, and {LATERAL}"),
+    Parameter("Strategies", f"{BY_VIEW}, {MODULATED}, {CAST}", f"the same, and {LATERAL}, which is not of the paper"),
     Parameter("Scan", "160 degrees at most", "160 degrees; with familiarity-based modulation from 40 to 160"),
     Parameter(
         "Second set",
