@@ -19,5 +19,7 @@ NAVIGATORS = Registry(
         "central-complex": f"{_HERE}.central_complex:CentralComplexSteering",
         "blend": f"{_HERE}.blend:Blend",
         "loop-breaker": f"{_HERE}.loop_breaker:LoopBreaker",
+        "familiarity-modulated": f"{_HERE}.familiarity_modulated:FamiliarityModulated",
+        "cast-and-surge": f"{_HERE}.cast_and_surge:CastAndSurge",
     },
 )
