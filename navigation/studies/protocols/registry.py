@@ -14,5 +14,6 @@ PROTOCOLS = Registry(
         "azevedo2025": f"{_HERE}.azevedo2025:AZEVEDO2025",
         "kagioulis2024": f"{_HERE}.kagioulis2024:KAGIOULIS2024",
         "apiaviz2026": f"{_HERE}.apiaviz2026:APIAVIZ2026",
+        "beenav2026": f"{_HERE}.beenav2026:BEENAV2026",
     },
 )
