@@ -2,6 +2,8 @@ from .navigator import Look as Look
 from .navigator import Motion as Motion
 from .navigator import Navigator as Navigator
 from .navigator import ScanRecord as ScanRecord
+from .opponent import Opponent as Opponent
+from .oscillator import Oscillator as Oscillator
 from .registry import NAVIGATORS as NAVIGATORS
 from .scan import Scan as Scan
 from .stepped_scan import SteppedScan as SteppedScan

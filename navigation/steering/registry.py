@@ -11,5 +11,7 @@ NAVIGATORS = Registry(
         "scan": f"{_HERE}.scan:Scan",
         "stepped-scan": f"{_HERE}.stepped_scan:SteppedScan",
         "lateral": f"{_HERE}.lateral:Lateral",
+        "opponent": f"{_HERE}.opponent:Opponent",
+        "oscillator": f"{_HERE}.oscillator:Oscillator",
     },
 )
