@@ -5,7 +5,7 @@ import logging
 import math
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from pathlib import Path
@@ -78,7 +78,7 @@ def run_sweep(
         try:
             if missing:
                 before = len(runs) - len(missing)
-                _run(missing, store, workers, lambda done: progress(before + done, len(runs)))
+                _run(missing, sweep.columns, store, workers, lambda done: progress(before + done, len(runs)))
         except BaseException:
             with suppress(InputError):  # what ended the sweep matters more, a full disk above all
                 _write_table(store, out)
@@ -115,12 +115,16 @@ def _by_key(sweep: Sweep) -> dict[str, Experiment]:
 
 
 def _run(
-    missing: dict[str, Experiment], store: Store, workers: str | int | None, progress: Callable[[int], object]
+    missing: dict[str, Experiment],
+    columns: Sequence[str] | None,
+    store: Store,
+    workers: str | int | None,
+    progress: Callable[[int], object],
 ) -> None:
-    """Do runs on a cluster and keep their results. Raises InputError for those that could not be finished."""
+    """Do runs on a cluster and keep their results, of the steps some columns. Raises InputError for those that could not be finished."""
     done, unfinished = 0, []
     with cluster(workers) as client:
-        for batch in _finished(client, missing):
+        for batch in _finished(client, missing, columns):
             kept = []
             for key, result in batch:
                 if isinstance(result, Walked | InputError):
@@ -138,9 +142,11 @@ def _run(
         )
 
 
-def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[tuple[str, Walked | BaseException]]]:
+def _finished(
+    client: Client, missing: dict[str, Experiment], columns: Sequence[str] | None
+) -> Iterator[list[tuple[str, Walked | BaseException]]]:
     """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
-    waiting, tasks = as_completed(loop=client.loop, raise_errors=False), _tasks(client, missing)
+    waiting, tasks = as_completed(loop=client.loop, raise_errors=False), _tasks(client, missing, columns)
     futures: dict[Future, list[str]] = {}
     gone: Exception | None = None
     while gone is None:
@@ -164,7 +170,9 @@ def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[t
     ) from gone
 
 
-def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Future, list[str]]]:
+def _tasks(
+    client: Client, missing: dict[str, Experiment], columns: Sequence[str] | None
+) -> Iterator[tuple[Future, list[str]]]:
     """Submit walks side by side, and what they need, as they are asked for; with the keys of their runs.
 
     Workers forget a world, views and a model when the last walk that needs them is done: this holds on to those of the last one only.
@@ -179,7 +187,7 @@ def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Fut
         for key, step in zip(known.shared(first), (Experiment.open_world_and_route, draw, learn), strict=True):
             needs[key] = earlier.get(key) or client.submit(step, first, *given, key=key, **options)
             given = [needs[key]]
-        yield client.submit(walk, runs, *given, key=f"walks-{tokenize(*keys)}", **options), keys
+        yield client.submit(walk, runs, *given, columns, key=f"walks-{tokenize(*keys)}", **options), keys
 
 
 def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
