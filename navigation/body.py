@@ -1,19 +1,8 @@
-"""The body that carries the eye: how far it steps, how well it turns, what stops it, and what it senses beside views."""
+"""The body that carries the eye: how far it steps, how well it turns, and what stops it."""
 
-from typing import Any
-
-from tussock.world.settings import choice, converted, number, settings
-from tussock.world.specs import Spec
-
-from .senses import SENSES
+from tussock.world.settings import choice, number, settings
 
 COLLISIONS = ("pass", "stop", "slide")
-
-
-def _senses(value: Any) -> Spec:
-    spec = SENSES.spec(value) if isinstance(value, str) else value if isinstance(value, Spec) else SENSES.spec_of(value)
-    spec.make()  # refuses bad parameters
-    return spec
 
 
 @settings
@@ -25,11 +14,9 @@ class Body:
         heading_noise: Standard deviation of the normal noise on every turn (rad).
         collisions: What plants and stones do to a step: it may "pass" through them, "stop" where the body touches one, or "slide" along it.
         radius: Of the body, seen from above (m).
-        senses: How well it measures its heading and the distance that it walks: a spec, such as "ant" (see senses.py).
     """
 
     step_length: float = number(0.05, low=1e-6, unit="m")
     heading_noise: float = number(0.0, low=0, unit="rad")
     collisions: str = choice("pass", COLLISIONS)
     radius: float = number(0.005, low=0, high=1, unit="m")
-    senses: Spec = converted(default="ideal", converter=_senses)

@@ -26,6 +26,7 @@ from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
 from .experiment_fields import as_encoding, as_model, as_navigator
+from .senses import as_senses
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -58,6 +59,7 @@ class Experiment(Surroundings):
         model: What tells how familiar a view is: a spec, such as "infomax rate=baddeley", or a file of a trained model.
         training: Which views are learned. A model from a file has learned already.
         body: How the agent moves.
+        senses: How well the agent measures its heading and the distance that it walks: a spec, such as "ant" (see senses.py).
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
         release: The walk starts this far from the route's end instead (m), facing it. 0: at the route's start.
         release_direction: In which direction of the world from there (rad, counter-clockwise from east).
@@ -71,6 +73,7 @@ class Experiment(Surroundings):
     model: Spec | Path = converted(default="perfect-memory", converter=as_model)
     training: TrainingSetup = instance_of(TrainingSetup, attrs.Factory(TrainingSetup), "a TrainingSetup")
     body: Body = instance_of(Body, attrs.Factory(Body), "a Body")
+    senses: Spec = converted(default="ideal", converter=as_senses)
     start_offset: float = number(0.0, unit="m")
     release: float = number(0.0, low=0, unit="m")
     release_direction: float = number(0.0, unit="rad")
@@ -80,6 +83,7 @@ class Experiment(Surroundings):
 
     def __attrs_post_init__(self):
         from .models.base import FamiliarityModel
+        from .models.random import RandomHeadings
         from .steering.navigator import Navigator
 
         super().__attrs_post_init__()
@@ -103,6 +107,11 @@ class Experiment(Surroundings):
         elif not takes(self.navigator.target, "model"):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"
+            )
+        elif not getattr(self.navigator.make(model=RandomHeadings()), "takes_trained", True):
+            raise SettingError(
+                f"the navigator {str(self.navigator)!r} learns views that face in other directions than those of a trained model, so it "
+                f"cannot use {self.model}; give a model's name"
             )
 
     def replace(self, **changes: Any) -> "Experiment":
@@ -181,6 +190,7 @@ class Experiment(Surroundings):
             poses=poses,
             views=images if images is None or trained is None else shared_views(model, images),
             seconds=time.perf_counter() - began,
+            encoding=self.encoding,
         )
 
     def training_views(self, renderer: "Renderer", route: "Route", progress: Progress = no_progress) -> "TrainingViews":
@@ -259,6 +269,7 @@ def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Rou
         body=[each.body for each in experiments],
         stopping=[each.stopping for each in experiments],
         displacement=[each.displacement for each in experiments],
+        senses=[each.senses.make() for each in experiments],
         noise=[default_rng(each.seed) for each in experiments],
     )
 

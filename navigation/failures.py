@@ -107,7 +107,15 @@ class Diagnosis:
 class Diagnostics:
     """Measures why the steps of a walk are poor."""
 
-    def __init__(self, renderer: Renderer, trained: TrainedModel | None, route: Route, views: Images | None = None):
+    def __init__(
+        self,
+        renderer: Renderer,
+        trained: TrainedModel | None,
+        route: Route,
+        views: Images | None = None,
+        *,
+        learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None,
+    ):
         """Prepare for walks along a route.
 
         Args:
@@ -117,6 +125,7 @@ class Diagnostics:
             route: The route that the walk is to follow.
             views: (m, h, w) The encoded views that it learned at these poses; they are kept, not copied. None: they are drawn again when
                 they are first needed.
+            learned: The encoding and the poses of the views, where what the walk follows is more than one model.
 
         Raises:
             SettingError: For a model that has learned nothing or through another eye, and for views that are not those at its poses.
@@ -126,7 +135,7 @@ class Diagnostics:
             trained.check_eye(renderer.eye)
         self._renderer, self._route, self._views = renderer, route, views
         self._recognises = trained is None or recognises(trained.model)
-        self._learned: tuple[Encoding, Float[np.ndarray, "m 3"]] | None = None
+        self._learned = learned
         if trained is not None and trained.poses is not None and trained.encoding is not None:
             self._learned = trained.encoding, trained.poses
             if views is not None and len(views) != len(trained.poses):

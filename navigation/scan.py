@@ -23,6 +23,33 @@ def scan_window(width: int, angle: float, centre: float = 0.0) -> Bool[np.ndarra
     return window
 
 
+def coarse_to_fine(
+    familiarity: Float[np.ndarray, "n w"], windows: Bool[np.ndarray, "n w"], spacing: int
+) -> Bool[np.ndarray, "n w"]:
+    """Which rotations are looked at by a scan in two passes: each `spacing` columns within the window, counted from its middle, and then
+    all between the neighbours of the most familiar of these.
+
+    Args:
+        familiarity: Of each rotation of each view.
+        windows: Rotations that may be looked at; each row one stretch of the circle, or all of it.
+        spacing: Columns between the rotations of the first pass.
+    """
+    width = windows.shape[1]
+    looked = np.zeros_like(windows)
+    for row, window in enumerate(windows):
+        allowed = np.flatnonzero(window)
+        if len(allowed) < width:  # begin after the gap, so that the stretch is in order
+            gap = int(np.flatnonzero(np.diff(allowed, append=allowed[0] + width) > 1)[0])
+            allowed = np.roll(allowed, -(gap + 1))
+        middle = len(allowed) // 2
+        coarse = allowed[middle % spacing :: spacing]
+        best = int(coarse[familiarity[row, coarse].argmax()])
+        about = (best + np.arange(-spacing + 1, spacing)) % width
+        looked[row, coarse] = True
+        looked[row, about[window[about]]] = True
+    return looked
+
+
 def best_turn(
     familiarity: Float[np.ndarray, "n w"], window: Bool[np.ndarray, "... w"] | None = None, interpolate: bool = True
 ) -> Float[np.ndarray, " n"]:

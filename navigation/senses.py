@@ -6,6 +6,7 @@ A spec names one, and may change it: "ideal", "ant", "robot compass_drift_deg=0"
 from dataclasses import dataclass
 from functools import partial
 from math import radians
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +14,7 @@ from jaxtyping import Float
 from tussock.world.geometry import wrap_angle
 from tussock.world.registry import Registry
 from tussock.world.settings import number, settings
+from tussock.world.specs import Spec
 
 
 @settings
@@ -54,6 +56,13 @@ SENSES = Registry(
         "bee": f"{__name__}:BEE",
     },
 )
+
+
+def as_senses(value: Any) -> Spec:
+    """The spec of senses from a text, a spec or `Senses`. Raises SettingError."""
+    spec = SENSES.spec(value) if isinstance(value, str) else value if isinstance(value, Spec) else SENSES.spec_of(value)
+    spec.make()  # refuses bad parameters
+    return spec
 
 
 @dataclass

@@ -56,7 +56,7 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "heading_noise_deg": (float, "body.heading_noise"),
     "collisions": (str, "body.collisions"),
     "body_radius_m": (float, "body.radius"),
-    "senses": (str, "body.senses"),
+    "senses": (str, "senses"),
     "release_m": (float, "release"),
     "release_deg": (float, "release_direction"),
     "displace_at": (float, "displacement.at"),

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from tussock.world.atomic import replacing
 
@@ -139,7 +139,7 @@ class Trajectory:
 
 
 def off_route(
-    deviation: Float[np.ndarray, " n"], side: Float[np.ndarray, " n"], error: Float[np.ndarray, " n"]
+    deviation: Float[np.ndarray, " n"], side: Int[np.ndarray, " n"], error: Float[np.ndarray, " n"]
 ) -> tuple[float | None, float | None]:
     """Shares of the looks off the route after which an agent headed back to it, and farther away from it; the others are parallel to it.
 

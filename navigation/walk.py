@@ -22,6 +22,7 @@ from tussock.world.geometry import Pose, Route
 from .body import Body
 from .displacement import Displacement
 from .encoding import Encoding
+from .senses import Senses
 from .steering.navigator import Images, Look, Motion, Navigator, PathIntegrating, check_motion
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread
@@ -45,6 +46,7 @@ class Walk:
         body: Body | Sequence[Body] | None = None,
         stopping: StoppingRules | Sequence[StoppingRules] | None = None,
         displacement: Displacement | Sequence[Displacement] | None = None,
+        senses: Senses | Sequence[Senses] | None = None,
         noise: int | Sequence[np.random.Generator] = 0,
     ):
         """Put agents at the start of a walk.
@@ -57,6 +59,7 @@ class Walk:
             body: How they move: all of them, or one for each.
             stopping: When their walks end: likewise.
             displacement: Where they are carried to the side: likewise.
+            senses: How well they measure their heading and the distance that they walk: likewise.
             noise: What the noise on the turns is drawn from: a generator for each agent, or a seed (agent k takes seed + k).
 
         Raises:
@@ -66,11 +69,11 @@ class Walk:
         self.world = renderer.world
         count = len(starts)
         bodies, rules = _each(body or Body(), count), _each(stopping or StoppingRules(), count)
-        carried = _each(displacement or Displacement(), count)
+        carried, measuring = _each(displacement or Displacement(), count), _each(senses or Senses(), count)
         generators = (
             [np.random.default_rng(noise + k) for k in range(count)] if isinstance(noise, int | np.integer) else noise
         )
-        each = zip(range(count), starts, bodies, rules, carried, generators, strict=True)
+        each = zip(range(count), starts, bodies, rules, carried, measuring, generators, strict=True)
         self.agents = [Walker(self, *of_agent) for of_agent in each]
         self.reach = renderer.reach if isinstance(renderer, DatabaseViews) else np.inf
         self._seen: tuple[UInt8[np.ndarray, "n height width channels"], Images] | None = None  # views, and as encoded

@@ -15,7 +15,7 @@ from tussock.world.terrain import Terrain
 
 from .body import Body
 from .displacement import Displacement
-from .senses import Readings
+from .senses import Readings, Senses
 from .steering.navigator import Journey, Motion
 from .stop_check import StopCheck
 from .stopping import StoppingRules, StopReason
@@ -101,6 +101,7 @@ class Walker:
         body: Body,
         stopping: StoppingRules,
         displacement: Displacement,
+        senses: Senses,
         random: np.random.Generator,
     ):
         check_inside(start, walk.world)
@@ -110,7 +111,7 @@ class Walker:
         self.stop_check = StopCheck(stopping, walk.route, walk.world.field, body.step_length)
         self.index, self.ended = 0, False
         self.displacement = displacement if displacement.left else None  # while it is to come
-        self.readings = Readings(body.senses.make(), random)
+        self.readings = Readings(senses, random)
         self.walked, self.touched, self.displaced = 0.0, False, False  # since the look before
         self.reset: StopReason | None = None
         self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
@@ -185,7 +186,8 @@ class Walker:
 
     def step(self, motion: Motion, row: int, view: np.ndarray | None, encoded: torch.Tensor | None) -> Step:
         """Do as a row of a motion says."""
-        stopping, body, pose, scan = self.stopping, self.body, self.pose, motion.scan
+        stopping, body, pose = self.stopping, self.body, self.pose
+        scan = motion.scan if motion.scan is not None and motion.scan.window[row].any() else None
         aim, share = float(motion.turn[row]), 1.0 if motion.step is None else float(motion.step[row])
         noise = body.heading_noise * self.random.standard_normal() if body.heading_noise else 0.0
         facing = pose.turned(aim + noise).rounded()

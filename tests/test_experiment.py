@@ -281,7 +281,8 @@ OTHER: dict[str, Any] = {
 def test_the_keys_differ_where_a_setting_differs(tmp_path):
     assert set(OTHER) == set(TYPES) - {"navigator", "route_database", "grid_database"}
     base = experiment_of({})
-    others = {name: experiment_of({name: value}) for name, value in OTHER.items()}
+    needed = {"goal_only": {"goal_walk_m": 0.9}}  # by which settings others are refused without
+    others = {name: experiment_of({name: value} | needed.get(name, {})) for name, value in OTHER.items()}
     others["navigator"] = experiment_of({"navigator": AHEAD})
     assert len({key_of(base), *map(key_of, others.values())}) == 1 + len(others)
     for key, names in ((route_key, {*ROUTE_SETTINGS, "seed"}), (training_key, set(TYPES) - set(WALK_SETTINGS))):

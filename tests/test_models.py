@@ -158,16 +158,15 @@ VISIBLE = torch.arange(24).expand(5, 24) + torch.arange(5)[:, None] > 8
 MASKS = {"all": None, "part": FeatureMask(VISIBLE), "normalised": FeatureMask(VISIBLE, normalised=True, gain=0.5)}
 
 
-@pytest.mark.parametrize("mask", MASKS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("seed", "mask"), [*enumerate(MASKS)])
 def test_score_is_the_familiarity_at_the_present_heading(name, mask, seed):
     model = small(name, seed=seed).see(MASKS[mask]).fit(views(12, seed))
-    queries = torch.cat([views(40, seed + 10), views(12, seed)])
+    queries = torch.cat([views(20, seed + 10), views(12, seed)])
     scores, scanned = model.score(queries), model.scan(queries)[:, 0]
     assert scores.dtype == torch.float32
-    assert scores.shape == (52,)
+    assert scores.shape == (32,)
     wrong = (scores - scanned).abs() > 1e-5 * scanned.abs().max()
-    assert wrong.float().mean() <= (0.02 if base(name) in THRESHOLDS else 0)
+    assert wrong.sum() <= (1 if base(name) in THRESHOLDS else 0)
     assert torch.equal(scores, torch.cat([model.score(view[None]) for view in queries]))
 
 
@@ -187,6 +186,25 @@ def test_score_of_encoded_views_is_exact(name):
     squared = ((whole[:20, None] - whole[None, 20:]) ** 2).sum(axis=(2, 3)).min(axis=1)
     expected = -np.sqrt(squared / 4096**2 / (5 * 24)).astype(np.float32)
     assert make_model(name).fit(encoded[20:]).score(encoded[:20]).numpy().tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("name", ["rbm", "autoencoder"])
+def test_score_of_large_views_has_the_same_bytes_alone_on_several_threads(name):
+    large, threads = views(3, h=100, w=400), torch.get_num_threads()
+    model = small(name, units=3).fit(large)
+    try:
+        torch.set_num_threads(2)
+        assert torch.equal(model.score(large), torch.cat([model.score(view[None]) for view in large]))
+    finally:
+        torch.set_num_threads(threads)
+
+
+@pytest.mark.parametrize("activation", ["identity", "logistic", "tanh", "relu"])
+def test_score_of_a_network_has_the_same_bytes_alone(activation):
+    model = small("mlp", activation=activation, hidden_layer_sizes=(13, 5)).fit(views(12))
+    scores, scanned = model.score(views(30, 1)), model.scan(views(30, 1))[:, 0]
+    assert torch.allclose(scores, scanned, rtol=0, atol=1e-5 * float(scanned.abs().max()))
+    assert torch.equal(scores, torch.cat([model.score(view[None]) for view in views(30, 1)]))
 
 
 @pytest.mark.parametrize("smoothing_deg", [0.0, 1.0, 6.0, 180.0])
@@ -425,10 +443,10 @@ def test_views_that_cannot_be_learned_or_scanned_are_refused(name):
 
 def test_a_score_beyond_float32_is_refused():
     model = small("mlp").fit(views(3))
-    model.restore((5, 24), {key: 1e12 * tensor for key, tensor in model.learned.items()})
+    model.restore((5, 24), {key: torch.full_like(tensor, 1e12) for key, tensor in model.learned.items()})
     for familiarity in (model.scan, model.score):
         with pytest.raises(SettingError, match="beyond float32"):
-            familiarity(1e11 * views(1))
+            familiarity(torch.full((1, 5, 24), 1e12))
 
 
 @pytest.mark.parametrize("device", ["cuda:99", "nonsense", ""])

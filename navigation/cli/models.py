@@ -155,6 +155,8 @@ class CompareCommand(LearningOptions):
     """.. within this distance of the route."""
     offset_m: float = 0.1
     """The walk home starts this far to the left of the route (negative: right)."""
+    navigator: str = RunOptions.navigator
+    """What steers on the walk home. Headings are recovered by the models alone."""
 
     def run(self) -> dict[str, Any]:
         from tussock.world.specs import split_list

@@ -232,7 +232,7 @@ class RunOptions(ModelOptions):
     """What plants and stones do to a step: let it pass through, stop it where the body touches one, or let it slide along."""
     body_radius_m: float = default(Body, "radius")
     """Radius of the body, which may not enter what it touches."""
-    senses: str = default(Body, "senses")
+    senses: str = default(Experiment, "senses")
     """How well the agent measures its heading and the distance it walks: ideal, robot, svo-gtsam, stankiewicz-webb, ant or bee, with their
     published noise; parameters may follow, as in 'ant compass_deg=10 speed=0.2'."""
     release_m: float = default(Experiment, "release")

@@ -12,8 +12,8 @@ from tussock.world.geometry import columns_of_turn
 from tussock.world.settings import number, numbers, whole
 
 from .base import Images, Learned, Model, Scans, Scores, Shapes, model
-from .filter_bank import responses_ahead
-from .rotations import in_batches, one_by_one
+from .filter_bank import FilterBank
+from .rotations import in_batches, linear_each, one_by_one
 
 NEGLIGIBLE = 0.02  # share of the weight whose samples are left out while a stump is searched
 THRESHOLDS = 63  # that are tried for a filter: quantiles of its responses
@@ -98,8 +98,7 @@ class AdaBoost(Model):
         away = torch.arange(width, device=views.device)
         wrong = torch.minimum(away, width - away) * (360 / width) >= self.tolerance_deg
         bank = self._bank(learned["filters"])
-        scans = [sum_of_votes(bank.responses(batch), learned) for batch in in_batches(views)]
-        scan = torch.cat(scans).where(wrong, -torch.inf)
+        scan = torch.cat([sum_of_votes(bank, learned, batch) for batch in in_batches(views)]).where(wrong, -torch.inf)
         turns = scan.topk(min(self.hard_negatives, int(wrong.sum())), dim=1).indices.tolist()
         return torch.stack([view.roll(k, dims=-1) for view, ks in zip(views, turns, strict=True) for k in ks])
 
@@ -110,15 +109,17 @@ class AdaBoost(Model):
         self._chosen = self._bank(self.learned["filters"])
 
     def _scan(self, views: Images) -> Scans:
-        return sum_of_votes(self._chosen.responses(views), self.learned)
+        return sum_of_votes(self._chosen, self.learned, views)
 
     def _score(self, views: Images) -> Scores:
-        return sum_of_votes(responses_ahead(self.learned["filters"], self._seen(views)), self.learned)[:, 0]
+        filters, cuts, votes = (self.learned[key] for key in ("filters", "cuts", "votes"))
+        responses = linear_each(self._seen(views).flatten(start_dim=1), filters.flatten(start_dim=1))
+        return linear_each((responses > cuts).float() * 2 - 1, votes[None])[:, 0]
 
 
-def sum_of_votes(responses: Float32[torch.Tensor, "n w features"], learned: Learned) -> Scans:
+def sum_of_votes(bank: FilterBank, learned: Learned, views: Images) -> Scans:
     """Sum of the votes of all stumps at each rotation."""
-    answers = (responses > learned["cuts"]).float() * 2 - 1
+    answers = (bank.responses(views) > learned["cuts"]).float() * 2 - 1
     return one_by_one(lambda answers: answers @ learned["votes"], answers)
 
 

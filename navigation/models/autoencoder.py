@@ -1,14 +1,13 @@
 """An autoencoder: views that it cannot reconstruct are unfamiliar."""
 
 import torch
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 
 from tussock.world.settings import number, whole
 
 from ..feature_mask import energies
 from .base import Images, Learned, Model, Scans, Scores, Shapes, model
-from .filter_bank import responses_ahead
-from .rotations import one_by_one
+from .rotations import linear_each, one_by_one
 
 
 @model
@@ -65,27 +64,25 @@ class Autoencoder(Model):
 
     def _prepare(self) -> None:
         weights, visible = self.learned["weights"].flatten(start_dim=1), self.learned["visible"].flatten()
-        self._filters = torch.cat([self.learned["weights"], self.learned["visible"][None]])
-        self._responses = self._bank(self._filters).responses
+        self._responses = self._bank(torch.cat([self.learned["weights"], self.learned["visible"][None]])).responses
+        self._encoder, self._decoder = weights, weights.T.contiguous()
         self._overlap, self._projection, self._energy = weights @ weights.T, weights @ visible, visible @ visible
 
     def _scan(self, views: Images) -> Scans:
-        return self._familiarity(self._responses(views), energies(views, self.mask))
-
-    def _score(self, views: Images) -> Scores:
-        seen = self._seen(views)
-        return self._familiarity(responses_ahead(self._filters, seen), energies(seen, None))[:, 0]
-
-    def _familiarity(
-        self, responses: Float32[torch.Tensor, "n w filters"], squares: Float[torch.Tensor, "n rotations"]
-    ) -> Scans:
-        """Minus the error at some rotations, from the responses of all filters and |v|^2 of what is seen."""
+        responses = self._responses(views)  # (n, w, units + 1)
         drive, bias = responses[..., :-1], responses[..., -1]
         h = torch.tanh(drive + self.learned["hidden"])
         product = (h * drive).sum(dim=2) + bias
         energy = one_by_one(self._energies, h)
-        squared = squares - 2 * product + energy
-        return -(squared.clamp(min=0) / self._size(*self._filters.shape[1:])).sqrt().float()
+        squared = energies(views, self.mask) - 2 * product + energy
+        return -(squared.clamp(min=0) / self._size(*views.shape[1:])).sqrt().float()
+
+    def _score(self, views: Images) -> Scores:
+        pixels = self._seen(views).flatten(start_dim=1)
+        h = torch.tanh(linear_each(pixels, self._encoder, self.learned["hidden"]))
+        reconstruction = linear_each(h, self._decoder, self.learned["visible"].flatten())
+        squared = (pixels - reconstruction).square().sum(dim=1)
+        return -(squared / self._size(*views.shape[1:])).sqrt()
 
     def _energies(self, h: Float32[torch.Tensor, "w units"]) -> Float32[torch.Tensor, " w"]:
         """|r|^2 of the reconstructions."""

@@ -2,7 +2,7 @@
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, Protocol, TypeVar, dataclass_transform, runtime_checkable
 
 import attrs
@@ -19,7 +19,7 @@ from ..feature_mask import WITH_MASK, FeatureMask, check_takes_partial, is_parti
 from .checks import MAX_COLUMNS, Images, check_bounded, check_familiarity, check_form, check_scan, check_training
 from .filter_bank import FilterBank
 from .registry import MODELS
-from .rotations import in_batches
+from .rotations import ALONE, in_batches
 
 Scans = Float32[torch.Tensor, "n w"]
 Scores = Float32[torch.Tensor, " n"]
@@ -190,12 +190,14 @@ class Model(ABC):
             SettingError: Before `fit`, and for views of another shape than the learned ones.
         """
         check_scan(views, self.shape, is_partial(self.mask))
-        return torch.empty(0, views.shape[2]) if len(views) == 0 else self._batched(self._scan, views)
+        return torch.empty(0, views.shape[2]) if len(views) == 0 else self._of_batches(self._scan, in_batches(views))
 
     def score(self, views: Images) -> Scores:
         """Familiarity of each view at its present heading: `scan(views)[:, 0]` but for rounding, at less cost. Refuses what `scan` does."""
         check_scan(views, self.shape, is_partial(self.mask))
-        return torch.empty(0) if len(views) == 0 else self._batched(self._score, views)
+        if len(views) == 0:
+            return torch.empty(0)
+        return self._of_batches(self._score, views.split(1) if views[0].numel() >= ALONE else in_batches(views))
 
     def restore(self, shape: tuple[int, int], learned: Learned) -> None:
         """Take over what was learned, by training or from a file; where that fails, the model stays as it was.
@@ -242,9 +244,9 @@ class Model(ABC):
             raise SettingError(f"{self.name}: views of {shape[1]} columns; give at most {MAX_COLUMNS}")
         check_form(self.name, learned, self._shapes(*shape), self.dtypes)
 
-    def _batched(self, familiarity: Callable[[Images], torch.Tensor], views: Images) -> torch.Tensor:
+    def _of_batches(self, familiarity: Callable[[Images], torch.Tensor], batches: Iterable[Images]) -> torch.Tensor:
         """Familiarity of views, batch by batch. Raises SettingError where it is not finite."""
-        results = torch.cat([familiarity(self._on_device(batch)) for batch in in_batches(views)])
+        results = torch.cat([familiarity(self._on_device(batch)) for batch in batches])
         check_familiarity(self.name, results)
         return results
 

@@ -24,7 +24,6 @@ import torch
 from jaxtyping import Float, Float32, Float64
 
 from ..feature_mask import FeatureMask
-from .rotations import one_by_one
 from .spectra import Nearest, Spectra
 
 
@@ -80,23 +79,6 @@ class FilterBank:
         for chunk in self._spectra.chunks(views):
             responses[chunk.views, :, chunk.filters] = chunk.responses()
         return responses
-
-
-def responses_ahead(
-    filters: Float[torch.Tensor, "m h w"],
-    views: Float32[torch.Tensor, "n h w"],
-    biases: Float32[torch.Tensor, " m"] | None = None,
-) -> Float32[torch.Tensor, "n 1 m"]:
-    """Responses at rotation 0 alone, which are plain products.
-
-    Args:
-        filters: (m, h, w)
-        views: (n, h, w) As the eye sees them at their present heading, so that a mask has no more to hide.
-        biases: (m,) Added to the responses; None means none.
-    """
-    rows = filters.flatten(start_dim=1)
-    responses = one_by_one(lambda view: rows @ view, views.to(filters.dtype).flatten(start_dim=1)).float()
-    return (responses if biases is None else responses + biases)[:, None]
 
 
 class NearestFilters:

@@ -9,7 +9,7 @@ from .base import Images, Learned, Scans, Scores, Shapes, model
 from .checks import MAX_VALUE
 from .filter_bank import FilterBank
 from .incremental import IncrementalModel
-from .rotations import one_by_one
+from .rotations import linear_each
 from .spectra import Spectra
 
 # Presets of the rate: eta / N of one update, for `units` units of `inputs` inputs.
@@ -117,7 +117,7 @@ class Infomax(IncrementalModel):
 
     def _score(self, views: Images) -> Scores:
         weights = self._learned["weights"].flatten(start_dim=1)
-        return -one_by_one(lambda view: (weights @ view).abs().sum(), self._seen(views).flatten(start_dim=1))
+        return -linear_each(self._seen(views).flatten(start_dim=1), weights).abs().sum(dim=1)
 
 
 def infomax_update(

@@ -19,7 +19,7 @@ from tussock.world.settings import choice, number, numbers, whole, wholes
 
 from .base import Images, Learned, Model, Scans, Scores, Shapes, model
 from .checks import check_scan, check_training
-from .rotations import one_by_one
+from .rotations import linear_each, one_by_one
 
 ACTIVATIONS: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
     "identity": lambda x: x,
@@ -175,7 +175,9 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
 
     def _score(self, views: Images) -> Scores:
         pixels = self._seen(views).flatten(start_dim=1)
-        return one_by_one(lambda view: forward(view, self._layers, self.activation), pixels)
+        if self.activation == "logistic":  # torch rounds it differently where a row stands elsewhere in memory
+            return one_by_one(lambda view: forward(view, self._layers, self.activation), pixels)
+        return forward(pixels, self._layers, self.activation, linear_each)
 
     def _train(self, inputs: torch.Tensor, targets: torch.Tensor) -> Layers:
         """Fitted layers."""
@@ -281,7 +283,9 @@ def in_span(inputs: torch.Tensor, layer: tuple) -> tuple[torch.Tensor, tuple, Ca
     return reduced, (torch.cat([inside, length], dim=1), biases), restored
 
 
-def forward(inputs: torch.Tensor, layers: Layers, activation: str) -> torch.Tensor:
+def forward(
+    inputs: torch.Tensor, layers: Layers, activation: str, linear: Callable[..., torch.Tensor] = linear
+) -> torch.Tensor:
     """Logits (...) of inputs (..., pixels)."""
     for k, layer in enumerate(layers):
         inputs = linear(inputs, *layer)

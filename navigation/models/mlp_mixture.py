@@ -6,7 +6,7 @@ from jaxtyping import Float32, Int64
 from tussock.world.errors import SettingError
 from tussock.world.settings import whole
 
-from .base import Images, Learned, Scans, model
+from .base import Images, Learned, model
 from .mlp_rotation import MLPRotation
 
 
@@ -46,7 +46,7 @@ class MLPMixture(MLPRotation):
 
     def active_expert(self, views: Images) -> Int64[torch.Tensor, "n w"]:
         """The segment to whose network each rotation is most familiar."""
-        return self._outputs(self._responses(self._on_device(views))).argmax(dim=2)
+        return self._outputs(self._on_device(views)).argmax(dim=2)
 
-    def _familiarity(self, outputs: Float32[torch.Tensor, "n w networks"]) -> Scans:
-        return outputs.logsumexp(dim=2)
+    def _familiarity(self, outputs: Float32[torch.Tensor, "*views networks"]) -> Float32[torch.Tensor, "*views"]:
+        return outputs.logsumexp(dim=-1)

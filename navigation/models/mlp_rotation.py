@@ -12,8 +12,8 @@ from tussock.world.errors import SettingError
 from tussock.world.settings import number, whole
 
 from .base import Images, Learned, Model, Scans, Scores, Shapes, model
-from .filter_bank import FilterBank, responses_ahead
-from .rotations import gaussian, one_by_one
+from .filter_bank import FilterBank
+from .rotations import gaussian, linear_each, one_by_one
 
 
 @model
@@ -98,17 +98,21 @@ class MLPRotation(Model):
     def _prepare(self) -> None:
         self._responses = self._bank(self.learned["weights"], self.learned["biases"]).responses
 
-    def _outputs(self, responses: Float32[torch.Tensor, "n w all_units"]) -> Float32[torch.Tensor, "n w networks"]:
-        return one_by_one(lambda each: network_outputs(each[None], self.learned["output"])[0], responses)
+    def _outputs(self, views: Images) -> Float32[torch.Tensor, "n w networks"]:
+        return one_by_one(
+            lambda responses: network_outputs(responses[None], self.learned["output"])[0], self._responses(views)
+        )
 
     def _scan(self, views: Images) -> Scans:
-        return self._familiarity(self._outputs(self._responses(views)))
+        return self._familiarity(self._outputs(views))
 
     def _score(self, views: Images) -> Scores:
-        responses = responses_ahead(self.learned["weights"], self._seen(views), self.learned["biases"])
-        return self._familiarity(self._outputs(responses))[:, 0]
+        weights, biases = self.learned["weights"].flatten(start_dim=1), self.learned["biases"]
+        activity = relu(linear_each(self._seen(views).flatten(start_dim=1), weights, biases))
+        return self._familiarity(linear_each(activity, readout(self.learned["output"]).T))
 
-    def _familiarity(self, outputs: Float32[torch.Tensor, "n w networks"]) -> Scans:
+    def _familiarity(self, outputs: Float32[torch.Tensor, "*views networks"]) -> Float32[torch.Tensor, "*views"]:
+        """Of views with such outputs."""
         return outputs[..., 0]
 
 
@@ -149,6 +153,10 @@ def network_outputs(
     responses: Float32[torch.Tensor, "n w all_units"], output: Float32[torch.Tensor, "networks units"]
 ) -> Float32[torch.Tensor, "n w networks"]:
     """Output of networks that see the same views, from the inputs of the units of all of them, one network after the other."""
+    return relu(responses) @ readout(output)
+
+
+def readout(output: Float32[torch.Tensor, "networks units"]) -> Float32[torch.Tensor, "all_units networks"]:
+    """Weights of the units of all networks, one network after the other, in the output of each."""
     own = torch.eye(len(output), device=output.device)
-    readout = (output[:, :, None] * own[:, None]).flatten(0, 1)  # (units of all networks, networks)
-    return relu(responses) @ readout
+    return (output[:, :, None] * own[:, None]).flatten(0, 1)

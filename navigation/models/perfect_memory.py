@@ -24,6 +24,9 @@ FILTERS = 1000  # snapshots whose responses behind a mask are computed at once; 
 
 # Error of squared distances by correlation, as a share of sqrt(w) (|v|^2 + |s|^2). Measured: under a quarter of it.
 ROUNDING = 1e-6
+PRODUCT_ROUNDING = (
+    2.5e-7  # of those by plain products, as a share of sqrt(h w) (|v|^2 + |s|^2). Measured: under a quarter of it.
+)
 DECIMALS = 8  # of squared distances in float64 behind a mask
 
 
@@ -95,12 +98,12 @@ class PerfectMemory(IncrementalModel):
             self._overlaps = list(overlaps(self.snapshots, self.mask))
             return
         self._on_cpu = self.snapshots.cpu().numpy()
-        if self.mask is not None:
-            self._banks = self._compared_seen(snapshots)
-            return
         centred = snapshots - self._level
         new = energies(centred, None)[:, 0]
         self._energies = torch.cat([self._energies, new])
+        if self.mask is not None:
+            self._banks = self._compared_seen(snapshots)
+            return
         self._filters = (
             NearestFilters(-2 * centred, new) if self._filters is None else self._filters.appended(-2 * centred, new)
         )
@@ -119,9 +122,16 @@ class PerfectMemory(IncrementalModel):
         return self._nearest(views)[0]
 
     def _score(self, views: Images) -> Scores:
+        """Plain products leave few snapshots that may be the most similar; from these the distance is computed directly."""
         if is_partial(self.mask):  # the familiarity of a rotation that is not compared depends on the others
             return super()._score(views)
-        squared = torch.from_numpy(_least(self._seen(views).contiguous().cpu().numpy(), self._on_cpu))
+        seen, count = self._seen(views).contiguous(), views[0].numel()
+        centred = seen - self._level
+        rough = self._energies - 2 * centred.flatten(start_dim=1) @ self.snapshots.flatten(start_dim=1).T
+        sizes = energies(centred, None)[:, 0] + self._energies.max() + count * self._level**2
+        limits = rough.amin(dim=1) + PRODUCT_ROUNDING * count**0.5 * sizes
+        some, distances, allowed = (each.cpu().numpy() for each in (seen, rough, limits))
+        squared = torch.from_numpy(_least(some, self._on_cpu, distances, allowed))
         squared = squared if self.mask is None else self._coarse(squared)
         return self._on_device(-(squared / self._size(*views.shape[1:])).sqrt().float())
 
@@ -222,13 +232,17 @@ def _decide_exactly(views, snapshots, first, last, allowed, tolerance, doubtful,
 
 
 @compiled
-def _least(views, snapshots):
-    """Squared distance (n,) of each view from the snapshot that is the most similar to it as it is."""
+def _least(views, snapshots, rough, limits):
+    """Squared distance (n,) of each view from the snapshot that is the most similar at its present heading.
+
+    Only those are compared whose `rough` (n, m) distance is within the view's limit (n,).
+    """
     squared, view = np.full(len(views), np.inf), np.empty(views.shape[1:])
     for v in range(len(views)):
         view[:] = views[v]
         for k in range(len(snapshots)):
-            squared[v] = min(squared[v], _distance(view, snapshots[k], squared[v]))
+            if rough[v, k] <= limits[v]:
+                squared[v] = min(squared[v], _distance(view, snapshots[k], squared[v]))
     return squared
 
 

@@ -153,6 +153,17 @@ def _scratch(rows, inverse, width):
     return products, parts, np.empty((width, TILE), rows.dtype)
 
 
+@compiled(fastmath={"reassoc"})
+def dot_products(rows, weights, products):
+    """Store the products (n, m) of rows (n, k) with weights (m, k), each summed by itself."""
+    for j in range(len(weights)):
+        for i in range(len(rows)):
+            row, weight, total = rows[i], weights[j], np.float32(0)
+            for k in range(len(row)):
+                total += row[k] * weight[k]
+            products[i, j] = total
+
+
 # In all of these, of n views and of the filters `first` to `first` + m of some tiles:
 #   rows (f, 2 n, k): of each view what gives the real parts of its products, then what gives the imaginary parts
 #   inverse: as `inverse_transform`

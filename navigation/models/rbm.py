@@ -1,14 +1,14 @@
 """A restricted Boltzmann machine: a generative model of the route's views, trained without negatives."""
 
 import torch
-from jaxtyping import Float, Float32
 from torch.nn.functional import softplus
 
 from tussock.world.settings import number, whole
 
 from ..feature_mask import energies
 from .base import Images, Learned, Model, Scans, Scores, Shapes, model
-from .filter_bank import FilterBank, responses_ahead
+from .filter_bank import FilterBank
+from .rotations import linear_each, one_by_one
 
 Parameters = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # weights, visible biases, hidden biases
 
@@ -75,24 +75,20 @@ class RBM(Model):
 
     def _prepare(self) -> None:
         hidden = self.learned["hidden"]
-        self._filters = torch.cat([self.learned["weights"], self.learned["visible"][None]])
-        self._biases = torch.cat([hidden, hidden.new_zeros(1)])
+        filters = torch.cat([self.learned["weights"], self.learned["visible"][None]])
         self._scaled = None if self.mask is None else self.mask.scaled(self.scale)
-        self._responses = FilterBank(self._filters, self._biases, self._scaled).responses
+        self._responses = FilterBank(filters, torch.cat([hidden, hidden.new_zeros(1)]), self._scaled).responses
 
     def _scan(self, views: Images) -> Scans:
         if self._scaled is None:
             views = self.scale * views
-        return self._familiarity(self._responses(views), energies(views, self._scaled))
+        responses = self._responses(views)  # (n, w, units + 1)
+        of_visible = self.learned["visible"].square().sum()
+        squared = energies(views, self._scaled) - 2 * responses[..., -1] + of_visible
+        return (softplus(responses[..., :-1]).sum(dim=2) - squared / 2).float()
 
     def _score(self, views: Images) -> Scores:
-        seen = self.scale * self._seen(views)
-        return self._familiarity(responses_ahead(self._filters, seen, self._biases), energies(seen, None))[:, 0]
-
-    def _familiarity(
-        self, responses: Float32[torch.Tensor, "n w filters"], squares: Float[torch.Tensor, "n rotations"]
-    ) -> Scans:
-        """Minus the free energy at some rotations, from the responses of all filters and |v|^2 of what is seen."""
-        of_visible = self.learned["visible"].square().sum()
-        squared = squares - 2 * responses[..., -1] + of_visible
-        return (softplus(responses[..., :-1]).sum(dim=2) - squared / 2).float()
+        pixels = self.scale * self._seen(views).flatten(start_dim=1)
+        responses = linear_each(pixels, self.learned["weights"].flatten(start_dim=1), self.learned["hidden"])
+        squared = (pixels - self.learned["visible"].flatten()).square().sum(dim=1)
+        return one_by_one(lambda each: softplus(each).sum(), responses) - squared / 2

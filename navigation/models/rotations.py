@@ -6,11 +6,15 @@ from collections.abc import Callable
 import numpy as np
 import torch
 from jaxtyping import Float32, Int64
+from torch.nn.functional import linear
 
 from tussock.world.geometry import turn_of_columns
 
+from .products import dot_products
+
 NEGLIGIBLE = 1e-6  # weight of a rotation, as a share of the largest, that changes no average in float32
 ROTATIONS = 6144  # of views that a model scores at once; what is held on the way is then 100 MB or so
+ALONE = 2**15  # pixels of a view from which on torch's threads share the sum of one view, but not those of several
 
 
 def in_batches(views: Float32[torch.Tensor, "n h w"]) -> tuple[Float32[torch.Tensor, "batch h w"], ...]:
@@ -26,6 +30,19 @@ def one_by_one(function: Callable[..., torch.Tensor], *of_views: torch.Tensor) -
     memory (so it is copied). This way a view is scanned to the same bytes as alone.
     """
     return torch.stack([function(*(each.clone() for each in of_view)) for of_view in zip(*of_views, strict=True)])
+
+
+def linear_each(
+    rows: Float32[torch.Tensor, "n k"],
+    weights: Float32[torch.Tensor, "m k"],
+    biases: Float32[torch.Tensor, " m"] | None = None,
+) -> Float32[torch.Tensor, "n m"]:
+    """torch's `linear`, which on a CPU gives a row the same bytes as alone, and takes less time for few rows."""
+    if rows.device.type != "cpu":
+        return linear(rows, weights, biases)
+    products = rows.new_empty(len(rows), len(weights))
+    dot_products(rows.contiguous().numpy(), weights.contiguous().numpy(), products.numpy())
+    return products if biases is None else products + biases
 
 
 def gaussian(width: int, deviation: float) -> Float32[torch.Tensor, " {width}"]:

@@ -1,9 +1,17 @@
+from .blend import Blend as Blend
+from .central_complex import CentralComplexSteering as CentralComplexSteering
+from .lateral import Lateral as Lateral
+from .loop_breaker import LoopBreaker as LoopBreaker
+from .navigator import Journey as Journey
+from .navigator import LearningPlaces as LearningPlaces
 from .navigator import Look as Look
 from .navigator import Motion as Motion
 from .navigator import Navigator as Navigator
+from .navigator import PathIntegrating as PathIntegrating
 from .navigator import ScanRecord as ScanRecord
 from .opponent import Opponent as Opponent
 from .oscillator import Oscillator as Oscillator
+from .path_integration import PathIntegration as PathIntegration
 from .registry import NAVIGATORS as NAVIGATORS
 from .scan import Scan as Scan
 from .stepped_scan import SteppedScan as SteppedScan

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from math import radians
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -33,6 +33,8 @@ class Lateral:
         slowest: The shortest step, as a share of a whole one.
     """
 
+    takes_trained: ClassVar[bool] = False
+
     model: FamiliarityModel = attrs.field()
     gain: float = number(8.0, above=0, unit="rad")
     bank: tuple[float, ...] = numbers(
@@ -43,6 +45,11 @@ class Lateral:
     slowest: float = number(0.2, above=0, high=1)
     left: Memory = attrs.field(init=False)
     right: Memory = attrs.field(init=False)
+
+    @property
+    def models(self) -> tuple[FamiliarityModel, FamiliarityModel]:
+        """What both memories have learned."""
+        return self.left.model, self.right.model
 
     def learn(self, views: Images) -> None:
         """Learn views (n, h, w) turned to both sides."""
@@ -57,4 +64,5 @@ class Lateral:
         left, right = self.left.unfamiliarity(look.views), self.right.unfamiliarity(look.views)
         turn = (self.gain * (left - right)).clip(-self.max_turn, self.max_turn)
         step = (1 - self.slowing * np.minimum(left, right)).clip(self.slowest, 1.0)
-        return Motion(turn=turn, step=step, signals={"left": left, "right": right})
+        certainty = (1 - np.minimum(left, right)).clip(0, 1)
+        return Motion(turn=turn, step=step, certainty=certainty, signals={"left": left, "right": right})

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import columns_of_turn
@@ -18,6 +18,7 @@ from tussock.world.geometry import columns_of_turn
 from ..models.base import FamiliarityModel, Images, Model, score
 
 SAMPLE = 64  # views by which a memory learns how familiar views are
+LIMIT = 100.0  # of unfamiliarity, which has no bounds where a memory cannot tell its own views from others
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,10 +64,11 @@ class Memory:
 
     def unfamiliarity(self, views: Images) -> Float[np.ndarray, " n"]:
         """Unfamiliarity of views (n, h, w) at their present heading: 0 as of learned views, 1 as of views that face the other way."""
-        return (self.familiar - self.familiarity(views)) / max(self.familiar - self.unfamiliar, np.finfo(float).tiny)
+        spread = max(self.familiar - self.unfamiliar, 1e-12)
+        return ((self.familiar - self.familiarity(views)) / spread).clip(-LIMIT, LIMIT)
 
 
-def turned(views: Images, angles: Sequence[float]) -> Images:
+def turned(views: Images, angles: Sequence[float]) -> Float32[torch.Tensor, "nk h w"]:
     """Views (n, h, w) as they are seen after turning left by each angle (rad), rounded to whole columns: (n k, h, w), a view's together."""
     columns = [round(float(columns_of_turn(angle, views.shape[2]))) for angle in angles]
     return torch.stack([views.roll(each, dims=2) for each in columns], dim=1).flatten(0, 1)

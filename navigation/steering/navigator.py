@@ -40,7 +40,7 @@ class ScanRecord:
 
     Attributes:
         familiarity: (n, w) Of every rotation of each view, turned left by 0, 1, .. columns.
-        window: (n, w) Which rotations were compared.
+        window: (n, w) Which rotations were compared; none of a row: that agent did not scan.
         match: (n,) Index of the learned view that was recognised; None where the model keeps no views.
         progress: For each agent the share of the learned sequence, 0 to 1, that it believes to have walked; None where it does not know.
     """
@@ -77,6 +77,7 @@ class Motion:
         turn: (n,) To the left (rad).
         step: (n,) Share of the body's step length, 0 to 1; None means whole steps.
         scan: What the decision was made from, where it was a scan.
+        certainty: (n,) How certain the decision is, 0 to 1, as `blend` weighs it; None means 1.
         looks: (n,) Headings that were looked at for the decision; None means one, or those of the scan.
         signals: (n,) or (n, k) What the decision was made from, by names of the navigator's own; for recordings and tables.
     """
@@ -84,8 +85,28 @@ class Motion:
     turn: Float[np.ndarray, " n"]
     step: Float[np.ndarray, " n"] | None = None
     scan: ScanRecord | None = None
+    certainty: Float[np.ndarray, " n"] | None = None
     looks: Int[np.ndarray, " n"] | None = None
     signals: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def spread(self, rows: Sequence[int], n: int) -> "Motion":
+        """A scan of k of n agents as the motion of all; the others do not look, and walk straight on."""
+        assert self.scan is not None
+        scan, turn = self.scan, np.zeros(n)
+        turn[rows] = self.turn
+        parts = [np.zeros((n, scan.window.shape[1]), dtype) for dtype in (np.float32, bool)]
+        parts[0][rows], parts[1][rows] = scan.familiarity, scan.window
+        match = None
+        if scan.match is not None:
+            match = np.zeros(n, dtype=np.int64)
+            match[rows] = scan.match
+        progress: list[float | None] = [None] * n
+        for row, value in zip(rows, scan.progress, strict=True):
+            progress[row] = value
+        certainty = np.zeros(n)
+        certainty[rows] = 1.0 if self.certainty is None else self.certainty
+        record = ScanRecord(familiarity=parts[0], window=parts[1], match=match, progress=progress)
+        return Motion(turn=turn, scan=record, certainty=certainty)
 
     def looks_of(self, row: int) -> int:
         """Headings that an agent looked at."""
@@ -99,7 +120,7 @@ class Navigator(Protocol):
     """Decides how agents move, from what they perceive and what it has learned. It never sees where they are.
 
     One navigator steers any number of agents side by side. A class is registered (docs/extending.md), and made with an untrained
-    familiarity model as `model`.
+    familiarity model as `model`. One that trains several models, and so cannot use one from a file, says `takes_trained = False`.
     """
 
     def learn(self, views: Images) -> None:

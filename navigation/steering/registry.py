@@ -13,5 +13,9 @@ NAVIGATORS = Registry(
         "lateral": f"{_HERE}.lateral:Lateral",
         "opponent": f"{_HERE}.opponent:Opponent",
         "oscillator": f"{_HERE}.oscillator:Oscillator",
+        "path-integration": f"{_HERE}.path_integration:PathIntegration",
+        "central-complex": f"{_HERE}.central_complex:CentralComplexSteering",
+        "blend": f"{_HERE}.blend:Blend",
+        "loop-breaker": f"{_HERE}.loop_breaker:LoopBreaker",
     },
 )

@@ -16,7 +16,6 @@ from tussock.world.specs import Spec
 
 from ..experiment import Experiment, TrainedNavigator, steps_of
 from ..failures import Cause
-from ..models.base import memory_bytes
 from ..registry import registry
 from ..threads import threads
 from ..trajectory import Trajectory
@@ -161,6 +160,6 @@ def _results(trajectory: Trajectory, trained: TrainedNavigator) -> dict[str, Any
     return summary | {
         "n_views": None if trained.poses is None else len(trained.poses),
         "route_m": trained.route.length,
-        "memory_bytes": None if trained.model is None else memory_bytes(trained.model.model),
+        "memory_bytes": trained.memory_bytes,
         **{f"{cause.replace(' ', '_')}_steps": causes.get(cause, 0) for cause in Cause},
     }
