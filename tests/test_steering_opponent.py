@@ -122,7 +122,12 @@ def test_what_cannot_be_is_refused():
 
 
 SMALL = Experiment(
-    world="tiny", world_seed=100, route_seed=100, route_length=1.5, encoding="foreground-mask | blur 3 | resize 6", threads=1
+    world="tiny",
+    world_seed=100,
+    route_seed=100,
+    route_length=1.5,
+    encoding="foreground-mask | blur 3 | resize 6",
+    threads=1,
 )
 
 

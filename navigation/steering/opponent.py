@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
+from typing import ClassVar
 
 import attrs
 import numpy as np
@@ -45,6 +46,8 @@ class Opponent:
         first: To which side an agent turns first.
     """
 
+    takes_trained: ClassVar[bool] = False
+
     model: FamiliarityModel = attrs.field()
     baseline: float = number(radians(90.0), low=0, high=np.pi, unit="rad")
     gain: float = number(radians(250.0), low=0, unit="rad")
@@ -53,6 +56,11 @@ class Opponent:
     first: str = choice("left", tuple(SIDES))
     attractive: Memory | None = attrs.field(init=False, default=None)
     repulsive: Memory | None = attrs.field(init=False, default=None)
+
+    @property
+    def models(self) -> list[FamiliarityModel]:
+        """What the memories have learned."""
+        return [memory.model for memory in (self.attractive, self.repulsive) if memory is not None]
 
     def learn(self, views: Images) -> None:
         """Learn views (n, h, w), and the same views turned by half a turn."""
@@ -76,7 +84,8 @@ class Opponent:
         side = np.array([memory.sign for memory in memories])
         for memory in memories:
             memory.sign = -memory.sign
-        return Motion(turn=side * amplitude, signals=signals)
+        certainty = (1 - np.min(list(signals.values()), axis=0)).clip(0, 1)
+        return Motion(turn=side * amplitude, certainty=certainty, signals=signals)
 
     def _unfamiliarity(self, memory: Memory, views: Images) -> Float[np.ndarray, " n"]:
         """Of views at their present heading, in the unit of this navigator."""

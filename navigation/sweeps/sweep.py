@@ -19,6 +19,7 @@ from distributed import CancelledError, Client, Future, LocalCluster, as_complet
 from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
+from tussock.render.eye import Eye
 from tussock.world.errors import FileError, InputError, MissingDependencyError, first_line
 from tussock.world.progress import Progress, no_progress
 
@@ -34,7 +35,11 @@ from .workers import METHOD, WORK, prepare_workers
 
 log = logging.getLogger(__name__)
 
-MAX_TOGETHER = 16  # runs: more gain little, and are kept later
+MAX_TOGETHER = 16  # runs: more gain little, and are kept later ..
+MAX_SMALL_TOGETHER, SMALL = (
+    64,
+    10_000,
+)  # .. but for views of few rays, where what a look costs beside drawing is worth sharing
 PARTS = 3  # groups of runs for each worker, where there are few runs
 QUEUED = 4  # groups that each worker has before it; more would only fill the scheduler's memory
 WORST = "worst"  # folder of the recordings
@@ -200,11 +205,16 @@ def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
         groups.setdefault(names, []).append(key)
         for name in names:
             first.setdefault(name, len(first))
-    size = min(MAX_TOGETHER, math.ceil(len(runs) / (PARTS * workers)))
-    parts = []
+    enough, parts = math.ceil(len(runs) / (PARTS * workers)), []
     for _, group in sorted(groups.items(), key=lambda item: [first[name] for name in item[0]]):
+        size = min(_most_together(runs[group[0]].eye), enough)
         parts += [part.tolist() for part in np.array_split(group, max(1, round(len(group) / size)))]
     return parts
+
+
+def _most_together(eye: Eye) -> int:
+    """How many runs with an eye walk together."""
+    return MAX_SMALL_TOGETHER if eye.width * eye.height * eye.rays**2 <= SMALL else MAX_TOGETHER
 
 
 def _workers(client: Client) -> int:
