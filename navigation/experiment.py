@@ -294,4 +294,5 @@ def steps_of(
         if diagnosed:
             yield from trained.diagnostics.along(walk)
         else:
-            yield from ([step and (step, None) for step in steps] for steps in walk)
+            for steps in walk:
+                yield [None if step is None else (step, None) for step in steps]

@@ -45,6 +45,7 @@ GRID = {
 SPREADS = (0, 135)  # degrees
 LEARNED, BASELINE, GAIN, RELEASED = "learning walk (m)", "baseline (degrees)", "gain (degrees)", "released at (m)"
 FINAL, MEAN = "distance at the end (m)", "mean distance (m)"
+MEANS: Any = {"walks": ("final_m", "size"), FINAL: ("final_m", "mean"), MEAN: ("mean_m", "mean")}
 CHOSEN_BASELINE = 90
 
 
@@ -78,28 +79,25 @@ def measure(walks: pd.DataFrame) -> StudyResults:
             RELEASED: grid["release_m"].astype(float).round(2),
         }
     )
-    cells, numbers = grid.groupby([LEARNED, BASELINE, GAIN, RELEASED]), ring.groupby(["memories", "spread"])
+    cells = grid.groupby([LEARNED, BASELINE, GAIN, RELEASED]).agg(**MEANS).reset_index()
+    release = ring.groupby(["memories", "spread"]).agg(**MEANS).reset_index()
     curves = ring.melt(
         ["memories", "spread"], [name for name in ring if name.startswith("at_")], "step", "distance (m)"
     ).assign(step=lambda table: table["step"].str.removeprefix("at_").astype(int))
     return StudyResults(
         tables={
-            "grid": cells.agg(
-                **{"walks": ("final_m", "size"), FINAL: ("final_m", "mean"), MEAN: ("mean_m", "mean")}
-            ).reset_index(),
+            "grid": cells,
             "gains": grid[(grid[BASELINE] == CHOSEN_BASELINE) & (grid[RELEASED] <= grid[LEARNED])]
             .groupby(["place", GAIN])["final_m"]
             .mean()
             .reset_index(),
             "curves": curves.groupby(["memories", "spread", "step"])["distance (m)"].mean().reset_index(),
-            "release": numbers.agg(
-                **{"walks": ("final_m", "size"), FINAL: ("final_m", "mean"), MEAN: ("mean_m", "mean")}
-            ).reset_index(),
+            "release": release,
             "walks": ring[["place", "memories", "spread", "release_deg", "final_m", "mean_m"]],
         },
         numbers={
-            f"{FINAL[:-4]}, {memories}, gaze within {spread} degrees (m)": float(each)
-            for (memories, spread), each in numbers["final_m"].mean().items()
+            f"distance at the end, {row['memories']}, gaze within {row['spread']} degrees (m)": row[FINAL]
+            for _, row in release.iterrows()
         },
     )
 
