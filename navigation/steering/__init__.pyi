@@ -15,6 +15,8 @@ from .navigator import Motion as Motion
 from .navigator import Navigator as Navigator
 from .navigator import PathIntegrating as PathIntegrating
 from .navigator import ScanRecord as ScanRecord
+from .opponent import Opponent as Opponent
+from .oscillator import Oscillator as Oscillator
 from .path_integration import PathIntegration as PathIntegration
 from .registry import NAVIGATORS as NAVIGATORS
 from .scan import Scan as Scan
