@@ -12,3 +12,5 @@ from .protocol import prepared as prepared
 from .protocol import route_files as route_files
 from .protocol import routes_in as routes_in
 from .registry import PROTOCOLS as PROTOCOLS
+from .stone2017 import STONE2017 as STONE2017
+from .worldless import WorldlessProtocol as WorldlessProtocol
