@@ -2,6 +2,7 @@ from .apiaviz2026 import APIAVIZ2026 as APIAVIZ2026
 from .ardin2016 import ARDIN2016 as ARDIN2016
 from .azevedo2025 import AZEVEDO2025 as AZEVEDO2025
 from .baddeley2012 import BADDELEY2012 as BADDELEY2012
+from .gattaux2025 import GATTAUX2025 as GATTAUX2025
 from .kagioulis2024 import KAGIOULIS2024 as KAGIOULIS2024
 from .knight2019 import KNIGHT2019 as KNIGHT2019
 from .protocol import DatabaseProtocol as DatabaseProtocol

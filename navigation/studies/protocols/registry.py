@@ -12,6 +12,7 @@ PROTOCOLS = Registry(
         "ardin2016": f"{_HERE}.ardin2016:ARDIN2016",
         "baddeley2012": f"{_HERE}.baddeley2012:BADDELEY2012",
         "azevedo2025": f"{_HERE}.azevedo2025:AZEVEDO2025",
+        "gattaux2025": f"{_HERE}.gattaux2025:GATTAUX2025",
         "kagioulis2024": f"{_HERE}.kagioulis2024:KAGIOULIS2024",
         "apiaviz2026": f"{_HERE}.apiaviz2026:APIAVIZ2026",
     },

@@ -28,8 +28,9 @@ def draw_flights(table: pd.DataFrame) -> Figure:
     """Flights out and home, an axis for each level of noise."""
     figure, panels = _panels(table)
     for axis, (_, part) in zip(panels, table.groupby("noise"), strict=True):
-        for (_, way), each in part.groupby(["bee", "part"], sort=False):
-            axis.plot(each["x"], each["y"], color=SOFT_COLOUR if way == "out" else PATH_COLOUR, lw=0.8)
+        for way, colour in (("out", SOFT_COLOUR), ("home", PATH_COLOUR)):
+            for _, each in part[part["part"] == way].groupby("bee"):
+                axis.plot(each["x"], each["y"], color=colour, lw=0.8)
         axis.plot(0, 0, "+", color=CURVE_COLOUR, ms=9, mew=1.6)
         axis.set_aspect("equal", adjustable="datalim")
     return figure
