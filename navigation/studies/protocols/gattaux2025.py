@@ -20,8 +20,8 @@ from .protocol import HOME, Item, Parameter, Protocol
 BODY = "mushroom-body"
 CELLS, WINNERS = 15_000, 0.01
 MODELS = (
-    f"{BODY} cells={CELLS} active={WINNERS} inputs=10 outputs=1 learning=depression depression=0.3 traversals=1 columns=32 rows=32 "
-    "smoothing_deg=0",
+    f"{BODY} cells={CELLS} active={WINNERS} inputs=40 outputs=1 learning=depression depression=0.1 traversals=1 columns=32 rows=32 "
+    "overlap_deg=0 smoothing_deg=0",
     "infomax",
     "perfect-memory",
 )
@@ -98,7 +98,7 @@ PARAMETERS = (
     Parameter(
         "View", "32 x 32, blurred, edges", "32 x 32, vertical edges of the skyline and of what stands in front of it"
     ),
-    Parameter("Kenyon cells", "15,000, of which 1 % fire", "the same, of 10 inputs each"),
+    Parameter("Kenyon cells", "15,000, of which 1 % fire", "the same, of 40 inputs each"),
     Parameter("Memory", "about 20 kB", "two outputs: 30 kB with a byte for each synapse (120 kB as we hold them)"),
     Parameter(
         "Learned",
