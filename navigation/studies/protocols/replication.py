@@ -2,6 +2,7 @@
 
 import re
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,9 @@ from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
 from ...sweeps.tables import compared_models, comparison_blocks
 from .protocol import DatabaseProtocol, Item, Protocol, check_models, route_names
+from .worldless import WorldlessProtocol
+
+AnyProtocol = Protocol | DatabaseProtocol | WorldlessProtocol
 
 SUMMARY = (
     "What the paper claims, the numbers that it gives where it gives any, the numbers obtained here, and whether the claim holds by the "
@@ -116,8 +120,46 @@ def measure_images(
     Raises:
         FileError: The images are missing or damaged.
     """
+    return _compute(protocol, lambda: protocol.measure(folder, seed, progress), out, about=about, command=command)
+
+
+def compute(
+    protocol: WorldlessProtocol,
+    out: Path,
+    *,
+    seed: int,
+    quick: bool,
+    about: dict[str, Any],
+    command: str,
+    progress: Progress = no_progress,
+) -> dict[str, Any]:
+    """Do a protocol that needs neither a world nor images, and write the report.
+
+    Args:
+        protocol: The experiment.
+        out: Folder of the report.
+        seed: Of everything random.
+        quick: A first look.
+        about: The choices made, for the head of the report.
+        command: Command line that repeats all of it.
+        progress: Called with how much is done, of how much.
+
+    Returns:
+        The result of `tussock replicate`.
+    """
+    return _compute(protocol, lambda: protocol.measure(seed, quick, progress), out, about=about, command=command)
+
+
+def _compute(
+    protocol: DatabaseProtocol | WorldlessProtocol,
+    measure: Callable[[], StudyResults],
+    out: Path,
+    *,
+    about: dict[str, Any],
+    command: str,
+) -> dict[str, Any]:
     began = time.perf_counter()
-    results = protocol.measure(folder, seed, progress)
+    results = measure()
     outcomes = check_claims(protocol.claims, [results], few_units=False)
     headline = _headline(outcomes)
     report = _report(protocol, results, outcomes, {}, about=about, left_out={}, command=command, headline=headline)
@@ -182,7 +224,7 @@ def _kind_of(error: str) -> str:
 
 
 def _report(
-    protocol: Protocol | DatabaseProtocol,
+    protocol: AnyProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     compared: dict[str, Any],
@@ -240,7 +282,7 @@ def _section(item: Item, table: pd.DataFrame) -> Section:
 
 
 def _results(
-    protocol: Protocol | DatabaseProtocol,
+    protocol: AnyProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     *,
