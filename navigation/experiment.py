@@ -25,7 +25,7 @@ from tussock.world.specs import Spec, takes
 from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
-from .experiment_fields import as_encoding, as_model, as_navigator
+from .experiment_fields import as_encoding, as_model, as_navigator, check_matches
 from .sense_models import as_senses
 from .stopping import StoppingRules
 from .surroundings import Surroundings
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from .encoding import Encoding
     from .failures import Diagnosis
     from .models.base import FamiliarityModel
-    from .models.files import TrainedModel
     from .training import TrainingViews
     from .trajectory import Trajectory
     from .walk import Walk
@@ -176,7 +175,7 @@ class Experiment(Surroundings):
         with threads(self.threads):
             if model is None and isinstance(self.model, Path):
                 loaded = load_model(self.model, device=self.device)
-                self.check_matches(loaded)
+                check_matches(self, loaded)
                 navigator = self.make_navigator(loaded.model)
                 images, poses = None, loaded.poses
             else:
@@ -215,14 +214,6 @@ class Experiment(Surroundings):
             return training_poses_in(route, beside, every=setup.every, learning_walk=setup.learning_walk)
         poses = poses_of_setup(setup, route, world.field)
         return poses[world.stands(poses[:, :2])]
-
-    def check_matches(self, trained: "TrainedModel") -> None:
-        """Refuse a trained model that learned through another eye or encoding. Raises SettingError."""
-        trained.check_eye(self.eye)
-        if trained.encoding is not None and trained.encoding != self.encoding:
-            raise SettingError(
-                f"{self.model} learned views encoded as {str(trained.encoding)!r}, this experiment has {str(self.encoding)!r}; use the same"
-            )
 
     def walk(self, renderer: "Renderer", route: "Route") -> "Walk":
         """The walk of one agent along a route, to be steered by a navigator."""

@@ -245,8 +245,9 @@ def _report(
         rows=[(each.name, each.published, each.here) for each in protocol.parameters],
     )
     walked, by = isinstance(protocol, Protocol), _compared(protocol)
-    kept = "Finished runs are in the folder and are not done again. " if walked else ""
-    again = Text(kept + "The same command gives the same numbers.")
+    blocks = comparison_blocks(compared, by) if compared else []
+    beside = [Section(title=f"{by.capitalize()}s compared", anchor=f"{by}s", blocks=blocks)] if compared else []
+    again = "Finished runs are in the folder and are not done again. " if walked else ""
     return Report(
         title=protocol.title,
         lead=protocol.question,
@@ -254,17 +255,17 @@ def _report(
         blocks=[
             Section(title="Does it hold?", anchor="summary", blocks=summary),
             Section(title="Results", anchor="results", blocks=shown),
-            *(
-                [Section(title=f"{by.capitalize()}s compared", anchor=f"{by}s", blocks=comparison_blocks(compared, by))]
-                if compared
-                else []
-            ),
+            *beside,
             Section(
                 title="Differences from the original",
                 anchor="differences",
                 blocks=[parameters, Bullets(protocol.differences)],
             ),
-            Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
+            Section(
+                title="To do it again",
+                anchor="again",
+                blocks=[Text(again + "The same command gives the same numbers."), Command(command)],
+            ),
         ],
         footer=f"After {protocol.paper} All numbers are in results.json"
         + (", every walk is in runs.parquet." if walked else "."),
@@ -274,8 +275,7 @@ def _report(
 
 
 def _section(item: Item, table: pd.DataFrame) -> Section:
-    draw = item.draw
-    if draw is None:
+    if (draw := item.draw) is None:
         return Section(title=item.title, anchor=item.name, blocks=[Table.of(table, item.caption)])
     drawing = Drawing(names=(item.name,), draw=lambda: [draw(table)], alt=item.title, caption=item.caption)
     return Section(title=item.title, anchor=item.name, blocks=[drawing])
