@@ -10,7 +10,7 @@ from tussock.navigation.steering import CastAndSurge, FamiliarityModulated, Look
 from tussock.world.errors import SettingError
 
 COLUMNS = 72  # of 5 degrees
-CAST, STEP = 75.0, 0.1  # degrees, m
+CAST, STEP = 80.0, 0.1  # degrees, m
 
 
 def view(way_deg, unfamiliarity, columns=COLUMNS):
@@ -121,13 +121,13 @@ def test_a_scan_is_centred_on_the_way():
     agent = Caster(learned(CastAndSurge, width=np.radians(60.0)))
     agent.go(0.1)
     assert agent.go(1.0) == CAST
-    assert agent.go(0.1, way_deg=25) == 25  # 50 degrees to the right of where it faces
+    assert agent.go(0.1, way_deg=25) == 25  # 55 degrees to the right of where it faces
 
 
 def test_familiarity_between_shows_no_way():
     agent = Caster(learned(CastAndSurge))
-    assert agent.go(0.79, way_deg=15) == 15
-    assert agent.go(0.81, way_deg=15) == 15 + CAST
+    assert agent.go(0.74, way_deg=15) == 15
+    assert agent.go(0.76, way_deg=15) == 15 + CAST
 
 
 def test_what_is_familiar_depends_on_the_most_unfamiliar_view():

@@ -50,8 +50,8 @@ class CastAndSurge:
 
     model: FamiliarityModel = attrs.field()
     width: float = number(radians(160.0), above=0, high=2 * np.pi, unit="rad")
-    known: float = number(0.8, above=0, high=1)
-    angle: float = number(radians(75.0), above=0, high=np.pi, unit="rad")
+    known: float = number(0.75, above=0, high=1)
+    angle: float = number(radians(80.0), above=0, high=np.pi, unit="rad")
     leg: float = number(0.5, above=0, unit="m")
     growth: float = number(2.0, low=1)
     smoothing: float = number(0.3, above=0, high=1)
