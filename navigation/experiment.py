@@ -281,11 +281,24 @@ def walk_of(experiments: Sequence[Experiment], renderer: "Renderer", route: "Rou
 
 
 def steps_of(
-    experiments: Sequence[Experiment], trained: TrainedNavigator
+    experiments: Sequence[Experiment], trained: TrainedNavigator, *, diagnosed: bool = True
 ) -> Iterator[list["tuple[Step, Diagnosis | None] | None"]]:
-    """Walk side by side what has the same `training_key`; a list with what `Experiment.steps` gives, or None for a walk that has ended."""
+    """Walk side by side what has the same `training_key`.
+
+    Args:
+        experiments: One for each walk.
+        trained: What they have learned.
+        diagnosed: Whether to find out what is wrong with poor steps.
+
+    Yields:
+        A list with what `Experiment.steps` gives, or None for a walk that has ended.
+    """
     from .threads import threads
 
     with threads(experiments[0].threads):
-        walk = walk_of(experiments, trained.renderer, trained.route)
-        yield from trained.diagnostics.along(walk.steps(trained.navigator))
+        walk = walk_of(experiments, trained.renderer, trained.route).steps(trained.navigator)
+        if diagnosed:
+            yield from trained.diagnostics.along(walk)
+        else:
+            for steps in walk:
+                yield [None if step is None else (step, None) for step in steps]

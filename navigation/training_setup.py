@@ -32,7 +32,7 @@ class TrainingSetup:
     learning_walk: float = number(0.2, low=0, unit="m")
     parallel_views: int = whole(0, low=0, high=999)
     goal_walk: float = number(0.0, low=0, unit="m")
-    goal_turns: float = number(2.0, above=0, high=100)
+    goal_turns: float = number(2.0, above=0)
     goal_views: int = whole(25, high=9999)
     goal_spread: float = number(0.0, low=0, high=math.pi, unit="rad")
     goal_only: bool = switch(False)

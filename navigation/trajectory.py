@@ -4,6 +4,7 @@ import csv
 import io
 import os
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -56,7 +57,8 @@ class Trajectory:
 
     def column(self, name: str) -> list:
         """The values of one of COLUMNS; empty texts where nothing is known."""
-        return [row[COLUMNS.index(name)] for row in self.rows]
+        place = COLUMNS.index(name)
+        return [row[place] for row in self.rows]
 
     @property
     def xy(self) -> Float[np.ndarray, "n 2"]:
@@ -105,7 +107,7 @@ class Trajectory:
         carried = [value != "" for value in self.column("displaced")]
         metres = float(walked[[not each for each in carried[1:]]].sum())
         deviation, error = np.array(self.column("deviation_m")), np.radians(self.column("error_deg"))
-        inward, outward = off_route(deviation, np.array(self.column("side")), error)
+        inward, outward = off_route(deviation, np.array(self.column("side"), dtype=float), error)
         back = deviation[carried.index(True) :] <= RECOVERED if any(carried) else None
         return {
             "looks_per_m": sum(self.column("looks")) / metres if metres else None,
@@ -116,10 +118,14 @@ class Trajectory:
             "recovered": None if back is None else bool(back.any()),
         }
 
-    def to_csv(self) -> str:
-        """The steps as CSV."""
+    def to_csv(self, columns: Sequence[str] | None = None) -> str:
+        """The steps as CSV. columns: Those of COLUMNS that are kept; None: all, and the signals."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
+        if columns is not None:
+            writer.writerow(columns)
+            writer.writerows(zip(*map(self.column, columns), strict=True))
+            return text.getvalue()
         names = list(dict.fromkeys(name for each in self.signals for name in each))
         writer.writerow([*COLUMNS, *names])
         for row, signals in zip(self.rows, self.signals, strict=True):

@@ -6,7 +6,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tussock.world.errors import SettingError
-from tussock.world.geometry import Bounds, Pose, Route, column_azimuths, columns_of_turn, turn_of_columns, wrap_angle
+from tussock.world.geometry import (
+    Bounds,
+    Pose,
+    Route,
+    column_azimuths,
+    columns_of_turn,
+    rounded,
+    turn_of_columns,
+    wrap_angle,
+)
 
 number = st.floats(-50, 50)
 angle = st.floats(-10, 10)
@@ -37,6 +46,12 @@ def test_the_heading_of_every_pose_is_in_the_range(x, y, heading, turn):
     assert np.allclose([np.cos(pose.heading), np.sin(pose.heading)], [np.cos(heading), np.sin(heading)], atol=1e-9)
     if -np.pi <= heading < np.pi:
         assert pose == (x, y, heading)
+
+
+@given(number, number, angle | near_half_turns)
+def test_a_pose_alone_is_rounded_as_one_of_many(x, y, heading):
+    pose = Pose(x, y, heading)
+    assert pose.rounded() == tuple(rounded(np.array([pose, (1.0, 2.0, 3.0)]))[0])
 
 
 def test_a_pose_keeps_a_heading_that_is_not_finite_for_others_to_refuse():

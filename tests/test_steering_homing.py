@@ -184,7 +184,7 @@ def test_average_landmark_vectors_lead_home_among_posts_whichever_way_agents_fac
         poses = around(radius)
         motion = decided(navigator, look_at(poses))
         assert errors_deg(poses, motion.turn).mean() < 25
-    assert set(motion.signals) == {"home_x", "home_y"}
+    assert motion.signals["home_direction"].shape == (16, 2)
     at_home = decided(navigator, look_at(flight[-1:]))
     assert at_home.turn[0] == 0
 
@@ -279,12 +279,12 @@ def test_a_home_vector_is_learned_among_posts():
     assert (one.turn == again.turn).all()
     assert (one.turn != other.turn).any()
     assert np.median(errors_deg(poses, one.turn)) < 25
-    length = np.hypot(one.signals["home_x_m"], one.signals["home_y_m"])
+    home = one.signals["home_vector"]
+    length = np.hypot(*home.T)
     assert length[:20].mean() < length[20:].mean()
-    np.testing.assert_allclose(one.step, (0.2 + 0.8 * length).clip(max=1))
-    np.testing.assert_allclose(
-        wrap_angle(np.arctan2(one.signals["home_y_m"], one.signals["home_x_m"]) - poses[:, 2] - one.turn), 0, atol=1e-9
-    )
+    np.testing.assert_allclose(np.asarray(one.step), (0.2 + 0.8 * length).clip(max=1))
+    off = wrap_angle(np.arctan2(home[:, 1], home[:, 0]) - poses[:, 2] - one.turn)
+    np.testing.assert_allclose(off, 0, atol=1e-9)
     row = 5
     alone = Look(views=look.views[row : row + 1], compass=look.compass[row : row + 1])
     assert decided(navigators[0], alone).turn[0] == one.turn[row]

@@ -1,5 +1,6 @@
 """Sweeps: what a file asks for, the same table from any cluster, and nothing lost whatever is killed."""
 
+import dataclasses
 import io
 import itertools
 import json
@@ -31,6 +32,7 @@ from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_keys import Keys, key_of, route_key, training_key, views_key
 from tussock.navigation.experiment_settings import TYPES, experiment_of, settings_of
+from tussock.navigation.failures import Diagnostics
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model
@@ -38,7 +40,14 @@ from tussock.navigation.reports.report import Drawing
 from tussock.navigation.sweeps.report import arrivals, write_sweep_report
 from tussock.navigation.sweeps.spec import Sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
-from tussock.navigation.sweeps.sweep import MAX_TOGETHER, finished_run, record_again, run_sweep, side_by_side
+from tussock.navigation.sweeps.sweep import (
+    MAX_SMALL_TOGETHER,
+    MAX_TOGETHER,
+    finished_run,
+    record_again,
+    run_sweep,
+    side_by_side,
+)
 from tussock.navigation.sweeps.sweep_file import read_sweep
 from tussock.navigation.sweeps.work import Walked, draw, learn, walk
 from tussock.navigation.sweeps.worst import learned_pose, walk_section
@@ -224,6 +233,34 @@ def test_runs_that_walk_together_have_the_results_that_they_have_alone():
     assert [each.steps for each in together] == [each.steps for each in alone]
     assert [each.results for each in together] == [each.results for each in alone]
     assert len({each.steps for each in together}) == len(runs)
+
+
+def test_a_sweep_may_keep_some_columns_of_the_steps(monkeypatch, tmp_path, cluster):
+    """The numbers are those of all columns; what is wrong with poor steps is not looked for, as nothing would tell of it."""
+    axes = {"start_offset": [0.0, 0.1], "body__heading_noise": [1.0]}
+    sweep = Sweep.over("", ALONE, axes)
+    run_sweep(sweep, tmp_path / "all", workers=cluster)
+    monkeypatch.setattr(Diagnostics, "examine", None)
+    run_sweep(dataclasses.replace(sweep, columns=("goal_m", "x_m")), tmp_path / "some", workers=cluster)
+    whole, part = table(tmp_path / "all"), table(tmp_path / "some")
+    for name in ("key", "steps", "mean_deviation_m", "goal_m", "reason"):
+        assert whole[name].tolist() == part[name].tolist()
+    assert (part["poor_steps"] == 0).all()
+    assert (whole["poor_steps"] > 0).all()
+    with Store(tmp_path / "all", read_only=True) as stored, Store(tmp_path / "some", read_only=True) as fewer:
+        for key in whole["key"]:
+            pd.testing.assert_frame_equal(
+                read_steps(fewer.steps(key)), read_steps(stored.steps(key))[["goal_m", "x_m"]]
+            )
+
+
+def test_more_runs_walk_together_where_views_are_small():
+    axes = {"start_offset": np.linspace(-1, 1, 192).tolist()}
+    for eye, most in ((ALONE.eye, MAX_TOGETHER), (Eye(width=60, height=10, samples=2), MAX_SMALL_TOGETHER)):
+        runs = {str(k): run for k, run in enumerate(Sweep.over("", ALONE.replace(eye=eye), axes).experiments)}
+        sizes = list(map(len, side_by_side(runs, 1)))
+        assert most / 2 < max(sizes) <= most
+        assert sum(sizes) == 192
 
 
 @pytest.mark.parametrize("kind", [InputError, ZeroDivisionError])

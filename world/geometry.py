@@ -74,8 +74,10 @@ class Pose(NamedTuple("Pose", [("x", float), ("y", float), ("heading", float)]))
         return super().__new__(cls, x, y, heading)
 
     def rounded(self) -> "Pose":
-        """As `rounded`."""
-        return Pose(*rounded(np.array(self)).tolist())
+        """As `rounded`, for one pose: an agent rounds its pose at each step, and arrays of three numbers take ten times as long."""
+        degrees = round(math.degrees(self.heading) / HEADING_STEP_DEG, 0) * HEADING_STEP_DEG
+        x, y = round(self.x * 1e9, 0) / 1e9, round(self.y * 1e9, 0) / 1e9
+        return Pose(x, y, wrap_angle(math.radians(degrees)))
 
     def turned(self, angle: float) -> "Pose":
         """The same position, turned left by `angle` (rad)."""

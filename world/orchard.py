@@ -33,11 +33,14 @@ def orchard(seed: int, trees: int = 15, reach: float = 50.0, apart: float = 5.0,
         SettingError: For invalid values, and where there is no room for so many trees.
     """
     for name, value, low in (("trees", trees, 0), ("reach", reach, 1), ("apart", apart, 0), ("height", height, 0.2)):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value < np.inf:
-            raise SettingError(f"the orchard's {name} is {value!r}; give a number from {low:g}")
+        kind = "whole number" if name == "trees" else "number"
+        if isinstance(value, bool) or not isinstance(value, int if name == "trees" else int | float):
+            raise SettingError(f"the orchard's {name} is {value!r}; give a {kind}")
+        if not low <= value < np.inf:
+            raise SettingError(f"the orchard's {name} is {value!r}; give a {kind} from {low:g}")
     land, shapes = seeded(seed).spawn(2)
     params, triangles, rgb = WorldParams(), [np.zeros((0, 3, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
-    for x, y in _positions(int(trees), float(reach), float(apart), land).tolist():
+    for x, y in _positions(trees, float(reach), float(apart), land).tolist():
         size, tone = height * float(np.clip(land.lognormal(0, 0.25), 0.6, 1.6)), float(land.random())
         corners, colours = tree(params, size, tone, shapes)
         triangles.append(corners + np.array([x, y, 0], np.float32))

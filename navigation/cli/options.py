@@ -26,7 +26,7 @@ from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny), generated from a seed; its parameters may follow, as in "
+    "A preset's name (tussock-field, meadow, scrub, tiny, orchard), generated from a seed; its parameters may follow, as in "
     "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
 )
 

@@ -1,6 +1,8 @@
 from .average_landmark_vector import AverageLandmarkVector as AverageLandmarkVector
 from .blend import Blend as Blend
+from .cast_and_surge import CastAndSurge as CastAndSurge
 from .central_complex import CentralComplexSteering as CentralComplexSteering
+from .familiarity_modulated import FamiliarityModulated as FamiliarityModulated
 from .home_vector import HomeVector as HomeVector
 from .homing import Homing as Homing
 from .image_gradient import ImageGradient as ImageGradient
@@ -13,6 +15,8 @@ from .navigator import Motion as Motion
 from .navigator import Navigator as Navigator
 from .navigator import PathIntegrating as PathIntegrating
 from .navigator import ScanRecord as ScanRecord
+from .opponent import Opponent as Opponent
+from .oscillator import Oscillator as Oscillator
 from .path_integration import PathIntegration as PathIntegration
 from .registry import NAVIGATORS as NAVIGATORS
 from .scan import Scan as Scan

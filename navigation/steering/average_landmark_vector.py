@@ -49,7 +49,7 @@ class AverageLandmarkVector:
         """Turn each agent along its difference."""
         home = self.vectors(look.views, look.compass) - self.goal
         turn = np.where(home.any(axis=1), wrap_angle(np.arctan2(home[:, 1], home[:, 0]) - look.compass), 0.0)
-        return Motion(turn=turn, signals={"home_x": home[:, 0], "home_y": home[:, 1]})
+        return Motion(turn=turn, signals={"home_direction": home})
 
     def vectors(self, views: Images, headings: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
         """The average landmark vectors of views (n, h, w) that face headings (rad), east and north; 0 of views without landmarks."""

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 from torch.nn.functional import conv1d, pad
 
-from tussock.world.geometry import column_azimuths, wrap_angle
+from tussock.world.geometry import column_azimuths
 from tussock.world.settings import number, settings, whole
 
 from ..models.rotations import one_by_one
@@ -47,9 +47,9 @@ class HomeVector:
         seed: Of the first weights, and of the order of the views.
     """
 
-    memory_kb: float = number(42.0, above=0, high=1e5, unit="kB")
-    passes: int = whole(150)
-    rate: float = number(2e-3, above=0)
+    memory_kb: float = number(3.4, above=0, high=1e5, unit="kB")
+    passes: int = whole(60)
+    rate: float = number(5e-3, above=0)
     slowest: float = number(0.2, above=0, high=1)
     whole_step_at: float = number(0.5, above=0, unit="m")
     seed: int = whole(0, low=0)
@@ -75,9 +75,9 @@ class HomeVector:
             ahead, left = one_by_one(lambda view: self.network(view[None])[0], look.views).double().numpy().T
         length, turn = np.hypot(ahead, left), np.arctan2(left, ahead)
         step = (self.slowest + (1 - self.slowest) * length / self.whole_step_at).clip(max=1.0)
-        direction = wrap_angle(look.compass + turn)
-        home = {"home_x_m": length * np.cos(direction), "home_y_m": length * np.sin(direction)}
-        return Motion(turn=turn, step=step, signals=home)
+        direction = look.compass + turn
+        home = length[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
+        return Motion(turn=turn, step=step, signals={"home_vector": home})
 
 
 def ways_home(places: Places) -> Vectors:

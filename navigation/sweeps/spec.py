@@ -22,11 +22,14 @@ class Sweep:
         title: In the user's words.
         axes: The choices of each axis, by its name.
         experiments: All combinations, the last axis changing fastest.
+        columns: Columns of the steps that are kept of each walk (COLUMNS of trajectory.py). None: all, and the navigator's signals.
+            What is wrong with poor steps is only looked for where the column "cause" is kept, as that takes a third of the time.
     """
 
     title: str
     axes: Mapping[str, Sequence[Any]]
     experiments: Sequence[Experiment]
+    columns: Sequence[str] | None = None
 
     def __len__(self) -> int:
         return len(self.experiments)

@@ -5,7 +5,7 @@ import logging
 import math
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from pathlib import Path
@@ -19,6 +19,7 @@ from distributed import CancelledError, Client, Future, LocalCluster, as_complet
 from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
+from tussock.render.eye import Eye
 from tussock.world.errors import FileError, InputError, MissingDependencyError, first_line
 from tussock.world.progress import Progress, no_progress
 
@@ -34,7 +35,11 @@ from .workers import METHOD, WORK, prepare_workers
 
 log = logging.getLogger(__name__)
 
-MAX_TOGETHER = 16  # runs: more gain little, and are kept later
+MAX_TOGETHER = 16  # runs: more gain little, and are kept later ..
+MAX_SMALL_TOGETHER, SMALL = (
+    64,
+    10_000,
+)  # .. but for views of few rays, where what a look costs beside drawing is worth sharing
 PARTS = 3  # groups of runs for each worker, where there are few runs
 QUEUED = 4  # groups that each worker has before it; more would only fill the scheduler's memory
 WORST = "worst"  # folder of the recordings
@@ -78,7 +83,7 @@ def run_sweep(
         try:
             if missing:
                 before = len(runs) - len(missing)
-                _run(missing, store, workers, lambda done: progress(before + done, len(runs)))
+                _run(missing, sweep.columns, store, workers, lambda done: progress(before + done, len(runs)))
         except BaseException:
             with suppress(InputError):  # what ended the sweep matters more, a full disk above all
                 _write_table(store, out)
@@ -115,12 +120,16 @@ def _by_key(sweep: Sweep) -> dict[str, Experiment]:
 
 
 def _run(
-    missing: dict[str, Experiment], store: Store, workers: str | int | None, progress: Callable[[int], object]
+    missing: dict[str, Experiment],
+    columns: Sequence[str] | None,
+    store: Store,
+    workers: str | int | None,
+    progress: Callable[[int], object],
 ) -> None:
-    """Do runs on a cluster and keep their results. Raises InputError for those that could not be finished."""
+    """Do runs on a cluster and keep their results, of the steps some columns. Raises InputError for those that could not be finished."""
     done, unfinished = 0, []
     with cluster(workers) as client:
-        for batch in _finished(client, missing):
+        for batch in _finished(client, missing, columns):
             kept = []
             for key, result in batch:
                 if isinstance(result, Walked | InputError):
@@ -138,9 +147,11 @@ def _run(
         )
 
 
-def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[tuple[str, Walked | BaseException]]]:
+def _finished(
+    client: Client, missing: dict[str, Experiment], columns: Sequence[str] | None
+) -> Iterator[list[tuple[str, Walked | BaseException]]]:
     """The results of runs, or what went wrong, as they finish. Raises InputError where the cluster is lost."""
-    waiting, tasks = as_completed(loop=client.loop, raise_errors=False), _tasks(client, missing)
+    waiting, tasks = as_completed(loop=client.loop, raise_errors=False), _tasks(client, missing, columns)
     futures: dict[Future, list[str]] = {}
     gone: Exception | None = None
     while gone is None:
@@ -164,7 +175,9 @@ def _finished(client: Client, missing: dict[str, Experiment]) -> Iterator[list[t
     ) from gone
 
 
-def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Future, list[str]]]:
+def _tasks(
+    client: Client, missing: dict[str, Experiment], columns: Sequence[str] | None
+) -> Iterator[tuple[Future, list[str]]]:
     """Submit walks side by side, and what they need, as they are asked for; with the keys of their runs.
 
     Workers forget a world, views and a model when the last walk that needs them is done: this holds on to those of the last one only.
@@ -179,7 +192,7 @@ def _tasks(client: Client, missing: dict[str, Experiment]) -> Iterator[tuple[Fut
         for key, step in zip(known.shared(first), (Experiment.open_world_and_route, draw, learn), strict=True):
             needs[key] = earlier.get(key) or client.submit(step, first, *given, key=key, **options)
             given = [needs[key]]
-        yield client.submit(walk, runs, *given, key=f"walks-{tokenize(*keys)}", **options), keys
+        yield client.submit(walk, runs, *given, columns, key=f"walks-{tokenize(*keys)}", **options), keys
 
 
 def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
@@ -192,11 +205,16 @@ def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
         groups.setdefault(names, []).append(key)
         for name in names:
             first.setdefault(name, len(first))
-    size = min(MAX_TOGETHER, math.ceil(len(runs) / (PARTS * workers)))
-    parts = []
+    enough, parts = math.ceil(len(runs) / (PARTS * workers)), []
     for _, group in sorted(groups.items(), key=lambda item: [first[name] for name in item[0]]):
+        size = min(_most_together(runs[group[0]].eye), enough)
         parts += [part.tolist() for part in np.array_split(group, max(1, round(len(group) / size)))]
     return parts
+
+
+def _most_together(eye: Eye) -> int:
+    """How many runs with an eye walk together."""
+    return MAX_SMALL_TOGETHER if eye.width * eye.height * eye.rays**2 <= SMALL else MAX_TOGETHER
 
 
 def _workers(client: Client) -> int:

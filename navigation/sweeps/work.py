@@ -94,13 +94,24 @@ def learn(experiment: Experiment, drawn: Drawn, model: Any = None) -> TrainedNav
     return replace(trained, seconds=drawn.seconds + trained.seconds)
 
 
-def walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[Walked | Exception]:
-    """Walk side by side, as experiments that have learned the same say; the results of each run, or its error."""
+def walk(
+    experiments: Sequence[Experiment], trained: TrainedNavigator, columns: Sequence[str] | None = None
+) -> list[Walked | Exception]:
+    """Walk side by side, as experiments that have learned the same say.
+
+    Args:
+        experiments: One for each walk.
+        trained: What they have learned.
+        columns: See `Sweep.columns`.
+
+    Returns:
+        The results of each run, or its error.
+    """
     try:
-        return _walk(experiments, trained)
+        return _walk(experiments, trained, columns)
     except Exception as error:
         if len(experiments) > 1:  # one of them is in the way of the others
-            return [result for each in experiments for result in walk([each], trained)]
+            return [result for each in experiments for result in walk([each], trained, columns)]
         if isinstance(error, InputError):
             return [error]
         told = RuntimeError(first_line(error))
@@ -108,12 +119,15 @@ def walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[W
         return [told]
 
 
-def _walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[Walked | Exception]:
+def _walk(
+    experiments: Sequence[Experiment], trained: TrainedNavigator, columns: Sequence[str] | None
+) -> list[Walked | Exception]:
     began = time.perf_counter()
     refused = {k: refusal for k, each in enumerate(experiments) if (refusal := _refusal(each, trained))}
     walking = [k for k in range(len(experiments)) if k not in refused]
     trajectories = [Trajectory() for _ in experiments]
-    for steps in steps_of([experiments[k] for k in walking], trained) if walking else ():
+    diagnosed = columns is None or "cause" in columns
+    for steps in steps_of([experiments[k] for k in walking], trained, diagnosed=diagnosed) if walking else ():
         for k, step in zip(walking, steps, strict=True):
             if step is not None:
                 trajectories[k].add(*step)
@@ -122,7 +136,7 @@ def _walk(experiments: Sequence[Experiment], trained: TrainedNavigator) -> list[
         Walked(
             refused=refused.get(k),
             results={} if k in refused else _results(trajectory, trained),
-            steps="" if k in refused else trajectory.to_csv(),
+            steps="" if k in refused else trajectory.to_csv(columns),
             seconds=per_step * len(trajectory),
             learn_seconds=trained.seconds,
         )

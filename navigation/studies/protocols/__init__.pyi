@@ -4,6 +4,7 @@ from .azevedo2025 import AZEVEDO2025 as AZEVEDO2025
 from .baddeley2012 import BADDELEY2012 as BADDELEY2012
 from .kagioulis2024 import KAGIOULIS2024 as KAGIOULIS2024
 from .knight2019 import KNIGHT2019 as KNIGHT2019
+from .lemoel2020 import LEMOEL2020 as LEMOEL2020
 from .protocol import DatabaseProtocol as DatabaseProtocol
 from .protocol import Item as Item
 from .protocol import Parameter as Parameter

@@ -14,6 +14,7 @@ from ...reports.drawing import (
     ROUTE_COLOUR,
     SOFT_COLOUR,
     canvas,
+    empty_figure,
     from_zero,
     legend_above,
 )
@@ -21,6 +22,7 @@ from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
 MAX_TICKS = 8  # at the values themselves
+MAX_COLUMNS = 3  # of heat maps
 MARKERS = "osD^vPX"  # seven, so that 35 models look different in five colours
 
 
@@ -103,3 +105,51 @@ def boxes(name: str, title: str, y: str, ylabel: str) -> Item:
     """The figure that `boxes_by_model` draws of a column of the table of walks."""
     caption = "Median, quartiles, lowest and highest of all walks."
     return Item(name, title, "walks", caption, lambda walks: boxes_by_model(walks, y, ylabel))
+
+
+def heat_maps(table: pd.DataFrame, x: str, y: str, value: str, *, by: str) -> Figure:
+    """A column against two others as colours, one map for each value of a third.
+
+    Args:
+        table: One row for each cell.
+        x: Column of the horizontal axis.
+        y: Column of the vertical axis.
+        value: The column that is shown.
+        by: Column of which each value has a map.
+
+    Returns:
+        The figure.
+    """
+    if table.empty:
+        return empty_figure("not in this run")
+    parts = [(label, part.pivot(index=y, columns=x, values=value)) for label, part in table.groupby(by)]
+    columns = min(MAX_COLUMNS, len(parts))
+    rows = -(-len(parts) // columns)
+    figure, axes = canvas((7.2, 0.7 + 2.3 * rows), rows, columns)
+    largest = float(table[value].max())
+    for axis in axes.flat[len(parts) :]:
+        axis.axis("off")
+    for axis, (label, cells) in zip(axes.flat, parts, strict=False):
+        image = axis.imshow(cells, cmap="viridis_r", vmin=0, vmax=largest, aspect="auto", origin="lower")
+        axis.set_xticks(range(cells.shape[1]), [f"{each:g}" for each in cells.columns], rotation=90)
+        axis.set_yticks(range(cells.shape[0]), [f"{each:g}" for each in cells.index])
+        axis.set_title(f"{by.partition(' (')[0]} {label:g}")
+        axis.set(xlabel=x, ylabel=y)
+    figure.colorbar(image, ax=axes, label=value)
+    return figure
+
+
+def distances_over_steps(table: pd.DataFrame, by: str, dashed: str) -> Figure:
+    """Distances (m) over steps. by: column of which each value has a colour; dashed: one whose second value has dashes."""
+    figure, axes = canvas((7.2, 3.4))
+    axis = axes[0, 0]
+    for (label, lines), colour in zip(table.groupby(by), COLOURS, strict=False):
+        for (_, line), style in zip(lines.groupby(dashed), ("-", "--"), strict=False):
+            axis.plot(
+                line["step"], line["distance (m)"], style, color=colour, lw=1.6, label=label if style == "-" else None
+            )
+    axis.set(xlabel="step", ylabel="distance (m)")
+    from_zero(axis)
+    axis.grid(axis="y", color="#00000018")
+    legend_above(axis)
+    return figure

@@ -3,7 +3,7 @@
 import logging
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -80,6 +80,7 @@ class Protocol:
         worlds: Number of worlds, with one route each, where none is given.
         quick_worlds: The same for a first look.
         quick_axes: Axes that have fewer choices in a first look.
+        more_axes: The axes of a second set of runs, if there is one.
         parameters: Published parameters.
         differences: Differences from the original, one sentence each.
         measure: Computes the results from a table of walks, with the columns of a sweep's table and those of `of_walk`. "model" has
@@ -87,6 +88,7 @@ class Protocol:
         claims: Claims of the paper that the results test. The figure of each is the name of an item.
         items: Figures and tables of the report.
         of_walk: Computes further columns for a walk, from its row of the table and its steps.
+        columns: Columns of the steps that it needs, where only these are to be kept; see `Sweep.columns`.
         world: World preset where none is given.
         layout: Makes the route that is learned and walked of each route; None takes the route itself.
         prepare_world: Makes the world that is walked in of one from a file, as colours where the file has none.
@@ -103,12 +105,14 @@ class Protocol:
     worlds: int = whole()
     quick_worlds: int = whole(1)
     quick_axes: dict[str, Sequence[Any]] = attrs.field(factory=dict)
+    more_axes: dict[str, Sequence[Any]] = attrs.field(factory=dict)
     parameters: Sequence[Parameter] = ()
     differences: Sequence[str] = ()
     measure: Callable[[pd.DataFrame], StudyResults]
     claims: Sequence[Claim] = ()
     items: Sequence[Item]
     of_walk: Callable[[dict[str, Any], pd.DataFrame], dict[str, float]] = lambda row, steps: {}
+    columns: Sequence[str] | None = None
     world: str = "tussock-field"
     layout: Callable[[Route], Route] | None = None
     prepare_world: Callable[[World], World] | None = None
@@ -133,8 +137,9 @@ class Protocol:
             quick: A first look.
             changes: Of the experiment, for all runs.
         """
-        axes = self.axes | (self.quick_axes if quick else {})
-        return Sweep.over(self.title, self.experiment.replace(threads=1, **changes), {"route": routes} | axes)
+        base, axes = self.experiment.replace(threads=1, **changes), self.axes | (self.quick_axes if quick else {})
+        sets = [Sweep.over(self.title, base, {"route": routes} | each) for each in (axes, self.more_axes) if each]
+        return replace(sets[0], experiments=[run for each in sets for run in each.experiments], columns=self.columns)
 
 
 def routes_in(world: str, routes: list[Path], *, seed: int = 0, count: int = 1) -> list[Change]:

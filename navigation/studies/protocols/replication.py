@@ -72,7 +72,7 @@ def replicate(
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
     outcomes = check_claims(protocol.claims, [results], few_units=False)
-    compared = compared_models(walks)
+    compared = compared_models(walks, _compared(protocol))
     headline = _headline(outcomes, arrivals(walks.assign(model=walks["spec"]), ["model"]))
     report = _report(
         protocol, results, outcomes, compared, about=about, left_out=left_out, command=command, headline=headline
@@ -171,6 +171,11 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
     return table.reset_index(drop=True), {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
 
+def _compared(protocol: Protocol | DatabaseProtocol) -> str:
+    """What a protocol compares: "navigator" where there are several, or else "model"."""
+    return "navigator" if isinstance(protocol, Protocol) and len(protocol.axes.get("navigator", ())) > 1 else "model"
+
+
 def _kind_of(error: str) -> str:
     """An error without what differs between errors of one kind: the text in parentheses."""
     return re.sub(r" \([^()]*\)", "", error).replace(" m is", " is")
@@ -197,7 +202,7 @@ def _report(
         columns=["Parameter", "Published", "Here"],
         rows=[(each.name, each.published, each.here) for each in protocol.parameters],
     )
-    walked = isinstance(protocol, Protocol)
+    walked, by = isinstance(protocol, Protocol), _compared(protocol)
     kept = "Finished runs are in the folder and are not done again. " if walked else ""
     again = Text(kept + "The same command gives the same numbers.")
     return Report(
@@ -208,7 +213,7 @@ def _report(
             Section(title="Does it hold?", anchor="summary", blocks=summary),
             Section(title="Results", anchor="results", blocks=shown),
             *(
-                [Section(title="Models compared", anchor="models", blocks=comparison_blocks(compared))]
+                [Section(title=f"{by.capitalize()}s compared", anchor=f"{by}s", blocks=comparison_blocks(compared, by))]
                 if compared
                 else []
             ),
