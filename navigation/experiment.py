@@ -109,8 +109,7 @@ class Experiment(Surroundings):
             )
         elif not getattr(self.navigator.make(model=RandomHeadings()), "takes_trained", True):
             raise SettingError(
-                f"the navigator {str(self.navigator)!r} learns views that face in other directions than those of a trained model, so it "
-                f"cannot use {self.model}; give a model's name"
+                f"the navigator {str(self.navigator)!r} must learn the views itself, so it cannot use {self.model}; give a model's name"
             )
 
     def replace(self, **changes: Any) -> "Experiment":

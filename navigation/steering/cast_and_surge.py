@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import radians
+from typing import ClassVar
 
 import attrs
 import numpy as np
@@ -47,6 +48,8 @@ class CastAndSurge:
         rise: How far below this mean unfamiliarity is while familiarity rises.
         first: To which side an agent casts first.
     """
+
+    takes_trained: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     width: float = number(radians(160.0), above=0, high=2 * np.pi, unit="rad")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from math import radians
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -34,6 +34,8 @@ class FamiliarityModulated:
         slowing: How much slower the agent walks at an unfamiliarity of 1, as a share of a whole step.
         slowest: The shortest step, as a share of a whole one.
     """
+
+    takes_trained: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     narrow: float = number(radians(40.0), above=0, high=2 * np.pi, unit="rad")

@@ -120,7 +120,7 @@ class Navigator(Protocol):
     """Decides how agents move, from what they perceive and what it has learned. It never sees where they are.
 
     One navigator steers any number of agents side by side. A class is registered (docs/extending.md), and made with an untrained
-    familiarity model as `model`. One that trains several models, and so cannot use one from a file, says `takes_trained = False`.
+    familiarity model as `model`. One that must learn the views itself, and so cannot use a model from a file, says `takes_trained = False`.
     """
 
     def learn(self, views: Images) -> None:
