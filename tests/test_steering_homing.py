@@ -9,7 +9,8 @@ from tussock.navigation.body import Body
 from tussock.navigation.experiment import Experiment, steps_of
 from tussock.navigation.experiment_keys import Keys, key_of
 from tussock.navigation.learning import learn_views
-from tussock.navigation.senses import ANT, Readings, Senses, measured_places
+from tussock.navigation.sense_models import ANT, Senses
+from tussock.navigation.senses import Readings, measured_places
 from tussock.navigation.steering import NAVIGATORS
 from tussock.navigation.steering.average_landmark_vector import AverageLandmarkVector
 from tussock.navigation.steering.home_vector import HomeVector, Network, units_within, ways_home, weights_of
@@ -184,7 +185,7 @@ def test_average_landmark_vectors_lead_home_among_posts_whichever_way_agents_fac
         poses = around(radius)
         motion = decided(navigator, look_at(poses))
         assert errors_deg(poses, motion.turn).mean() < 25
-    assert motion.signals["home_direction"].shape == (16, 2)
+    assert motion.signals["home_vector"].shape == (16, 2)
     at_home = decided(navigator, look_at(flight[-1:]))
     assert at_home.turn[0] == 0
 

@@ -49,7 +49,7 @@ class AverageLandmarkVector:
         """Turn each agent along its difference."""
         home = self.vectors(look.views, look.compass) - self.goal
         turn = np.where(home.any(axis=1), wrap_angle(np.arctan2(home[:, 1], home[:, 0]) - look.compass), 0.0)
-        return Motion(turn=turn, signals={"home_direction": home})
+        return Motion(turn=turn, signals={"home_vector": home})
 
     def vectors(self, views: Images, headings: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
         """The average landmark vectors of views (n, h, w) that face headings (rad), east and north; 0 of views without landmarks."""
