@@ -61,6 +61,7 @@ def made_up(rng: np.random.Generator) -> dict[str, Any]:
         "arrived": arrived, "reason": "arrived" if arrived else "lost", "steps": STEPS - 1,
         "mean_deviation_m": float(rng.gamma(2, 0.05)), "max_deviation_m": float(rng.gamma(2, 0.1)),
         "mean_error_deg": float(rng.gamma(2, 6)), "resets": 0, "cause": cause, "poor_steps": poor,
+        "looks_per_m": 1220.0, "touches": 0, "inward": 0.5, "outward": 0.25, "goal_m": 0.14, "recovered": None,
         "max_view_distance_m": None, "n_views": 1400, "route_m": 7.999738810199725, "memory_bytes": 16800000,
         **{f"{each.replace(' ', '_')}_steps": poor if each == cause else 0 for each in causes},
     }  # fmt: skip

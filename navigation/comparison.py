@@ -13,6 +13,7 @@ from tussock.world.specs import Spec
 
 from .evaluation import encoded_views, errors_of_views, facing_east
 from .experiment import Experiment
+from .learning import learn_views
 from .models.base import memory_bytes
 from .stopping import StopReason
 from .tested_poses import route_views_of
@@ -62,10 +63,11 @@ def compare_models(
     check_inside(experiment.start(route), renderer.world)
     encoding = experiment.encoding
     on_route = experiment.replace(training__learning_walk=0.0)
-    views_on_route, views_around = (
-        training_views(encoding, renderer, each.training_poses(renderer.world, route))[0]
+    (views_on_route, _), (views_around, around) = (
+        training_views(encoding, renderer, each.training_poses(renderer.world, route))
         for each in (on_route, experiment)
     )
+    senses = experiment.senses.make()
     route_views, poses = route_views_of(experiment, route), facing_east(positions)
     views = list(encoded_views(encoding, renderer, poses))
     for spec in models:
@@ -75,8 +77,8 @@ def compare_models(
         fitted = time.perf_counter()
         errors = errors_of_views(model, views, route_views, poses)
         scanned = time.perf_counter()
-        navigator = experiment.navigator.make(model=experiment.replace(model=spec).make_model())
-        navigator.learn(views_around)
+        navigator = experiment.make_navigator(experiment.replace(model=spec).make_model())
+        learn_views(navigator, views_around, around, route=route, senses=senses, seed=experiment.seed)
         *_, (last,) = experiment.walk(renderer, route).steps(navigator)
         yield Comparison(
             median_error_deg=errors.median_error_deg,

@@ -25,8 +25,8 @@ from tussock.world.specs import Spec, takes
 from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
-from .experiment_fields import as_encoding, as_model, as_navigator
-from .senses import as_senses
+from .experiment_fields import as_encoding, as_model, as_navigator, check_matches
+from .sense_models import as_senses
 from .stopping import StoppingRules
 from .surroundings import Surroundings
 from .trained_navigator import TrainedNavigator
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from .encoding import Encoding
     from .failures import Diagnosis
     from .models.base import FamiliarityModel
-    from .models.files import TrainedModel
     from .training import TrainingViews
     from .trajectory import Trajectory
     from .walk import Walk
@@ -59,7 +58,7 @@ class Experiment(Surroundings):
         model: What tells how familiar a view is: a spec, such as "infomax rate=baddeley", or a file of a trained model.
         training: Which views are learned. A model from a file has learned already.
         body: How the agent moves.
-        senses: How well the agent measures its heading and the distance that it walks: a spec, such as "ant" (see senses.py).
+        senses: How well the agent measures its heading and the distance that it walks: a spec, such as "ant" (see sense_models.py).
         start_offset: The walk starts this far to the left of the route's start (m; negative: right).
         release: The walk starts this far from the route's end instead (m), facing it. 0: at the route's start.
         release_direction: In which direction of the world from there (rad, counter-clockwise from east).
@@ -98,7 +97,7 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the model {str(self.model)!r} lacks fit(views) or scan(views); name a familiarity model"
                 )
-            if not isinstance(self.navigator.make(model=model), Navigator):
+            if not isinstance(self.make_navigator(model), Navigator):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
@@ -135,6 +134,10 @@ class Experiment(Surroundings):
             raise SettingError(f"{self.model} is a trained model; give a model's name")
         return seeing(self.model.make(seed=self.seed, device=self.device), self.encoding.for_eye(self.eye).mask)
 
+    def make_navigator(self, model: "FamiliarityModel") -> Any:
+        """The navigator, with a model that it may take."""
+        return self.navigator.make(model=model, seed=self.seed)
+
     def start(self, route: "Route") -> "Pose":
         """Where the walk begins."""
         from tussock.world.geometry import Pose
@@ -162,6 +165,7 @@ class Experiment(Surroundings):
             model: An untrained model to take in place of the experiment's, told what the eye sees.
             views: The training views, as `training_views` gives them, where they are drawn already.
         """
+        from .learning import learn_views
         from .models.base import FamiliarityModel, Model
         from .models.files import TrainedModel, load_model
         from .threads import threads
@@ -171,13 +175,14 @@ class Experiment(Surroundings):
         with threads(self.threads):
             if model is None and isinstance(self.model, Path):
                 loaded = load_model(self.model, device=self.device)
-                self.check_matches(loaded)
-                navigator = self.navigator.make(model=loaded.model)
+                check_matches(self, loaded)
+                navigator = self.make_navigator(loaded.model)
                 images, poses = None, loaded.poses
             else:
-                navigator = self.navigator.make(model=self.make_model() if model is None else model)
+                navigator = self.make_navigator(self.make_model() if model is None else model)
                 images, poses = views or self.training_views(renderer, route, progress)
-                navigator.learn(images.clone())  # others learn them, too, and a model of the user's may change them
+                own = images.clone()  # others learn them, too, and a model of the user's may change them
+                learn_views(navigator, own, poses, route=route, senses=self.senses.make(), seed=self.seed)
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):
@@ -209,14 +214,6 @@ class Experiment(Surroundings):
             return training_poses_in(route, beside, every=setup.every, learning_walk=setup.learning_walk)
         poses = poses_of_setup(setup, route, world.field)
         return poses[world.stands(poses[:, :2])]
-
-    def check_matches(self, trained: "TrainedModel") -> None:
-        """Refuse a trained model that learned through another eye or encoding. Raises SettingError."""
-        trained.check_eye(self.eye)
-        if trained.encoding is not None and trained.encoding != self.encoding:
-            raise SettingError(
-                f"{self.model} learned views encoded as {str(trained.encoding)!r}, this experiment has {str(self.encoding)!r}; use the same"
-            )
 
     def walk(self, renderer: "Renderer", route: "Route") -> "Walk":
         """The walk of one agent along a route, to be steered by a navigator."""

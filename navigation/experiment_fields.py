@@ -1,10 +1,13 @@
 """What the fields of an experiment are made of: encodings, models and navigators from their names, specs and files."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tussock.world.errors import FileError, SettingError
 from tussock.world.specs import Spec
+
+if TYPE_CHECKING:
+    from .models.files import TrainedModel
 
 MODEL_SUFFIX = ".safetensors"  # of files of trained models
 
@@ -48,3 +51,13 @@ def as_navigator(value: Any) -> Any:
     if isinstance(value, Spec | type):
         return value if isinstance(value, Spec) else NAVIGATORS.spec_of(value)
     raise SettingError(f"navigator is {value!r}; give a spec, such as 'scan', or a class")
+
+
+def check_matches(experiment: Any, trained: "TrainedModel") -> None:
+    """Refuse a trained model that learned through another eye or encoding than an experiment has. Raises SettingError."""
+    trained.check_eye(experiment.eye)
+    if trained.encoding is not None and trained.encoding != experiment.encoding:
+        raise SettingError(
+            f"{experiment.model} learned views encoded as {str(trained.encoding)!r}, this experiment has {str(experiment.encoding)!r}; use "
+            "the same"
+        )

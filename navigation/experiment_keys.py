@@ -43,7 +43,7 @@ ROUTE_SETTINGS = (
 VIEW_SETTINGS = (  # decide with these the views that are learned
     "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "mask", "threads",
     "encoding", "resize", "blur", "spacing_m", "every", "learning_walk_m", "parallel_views",
-    "goal_walk_m", "goal_views", "goal_spread_deg", "goal_only",
+    "goal_walk_m", "goal_turns", "goal_views", "goal_spread_deg", "goal_only",
 )  # fmt: skip
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "collisions", "body_radius_m", "release_m", "release_deg",

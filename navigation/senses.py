@@ -1,68 +1,15 @@
-"""What an agent measures of its own motion: a compass and an odometer, with the noise models of published studies.
-
-A spec names one, and may change it: "ideal", "ant", "robot compass_drift_deg=0".
-"""
+"""What an agent measures of its own motion: a compass and an odometer, with the noise of published studies (sense_models.py)."""
 
 from dataclasses import dataclass
-from functools import partial
-from math import radians
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from tussock.world.geometry import wrap_angle
-from tussock.world.registry import Registry
-from tussock.world.settings import number, settings
-from tussock.world.specs import Spec
 
+from .sense_models import Senses
 
-@settings
-class Senses:
-    """How well an agent measures its heading and the distance that it walks.
-
-    Errors grow with the square root of distance and time, so that they do not depend on the length of a step.
-
-    Attributes:
-        odometry: Standard deviation of the measured distance (m) after 1 m.
-        compass: Standard deviation of the heading over 1 s (rad), new at each reading, as of a sky compass.
-        compass_drift: Standard deviation of the heading after 1 s (rad), which adds up, as of a gyroscope.
-        speed: At which the agent walks (m/s): the time that a step takes.
-    """
-
-    odometry: float = number(0.0, low=0, unit="m")
-    compass: float = number(0.0, low=0, unit="rad")
-    compass_drift: float = number(0.0, low=0, unit="rad")
-    speed: float = number(0.1, above=0, unit="m/s")
-
-
-# Noise of the odometer (per root metre) and of the heading (degrees per root second), as Bee-Nav (2026) compares them. Ants and bees have a
-# compass in the sky, so theirs does not add up; robots turn by gyroscopes and images. Speeds are chosen here, but that of the bee.
-ROBOT = partial(Senses, odometry=0.10, compass_drift=radians(0.63), speed=0.5)
-SVO_GTSAM = partial(Senses, odometry=0.015, compass_drift=radians(0.25), speed=0.5)
-STANKIEWICZ_WEBB = partial(Senses, odometry=0.15, compass=radians(5.5), speed=0.5)
-ANT = partial(Senses, odometry=0.38, compass=radians(57.0), speed=0.3)
-BEE = partial(Senses, odometry=0.38, compass=radians(34.5), speed=2.5)
-
-SENSES = Registry(
-    "senses",
-    "model of senses",
-    {
-        "ideal": f"{__name__}:Senses",
-        "robot": f"{__name__}:ROBOT",
-        "svo-gtsam": f"{__name__}:SVO_GTSAM",
-        "stankiewicz-webb": f"{__name__}:STANKIEWICZ_WEBB",
-        "ant": f"{__name__}:ANT",
-        "bee": f"{__name__}:BEE",
-    },
-)
-
-
-def as_senses(value: Any) -> Spec:
-    """The spec of senses from a text, a spec or `Senses`. Raises SettingError."""
-    spec = SENSES.spec(value) if isinstance(value, str) else value if isinstance(value, Spec) else SENSES.spec_of(value)
-    spec.make()  # refuses bad parameters
-    return spec
+READING = 0.5  # s between readings on a learning walk, as in Bee-Nav's simulation
 
 
 @dataclass
@@ -96,3 +43,27 @@ class Readings:
 
     def _normal(self, count: int) -> Float[np.ndarray, " count"]:
         return self.random.standard_normal(count)
+
+
+def measured_places(
+    poses: Float[np.ndarray, "n 3"], goal: Float[np.ndarray, "2"], readings: Readings
+) -> Float[np.ndarray, "n 3"]:
+    """Where an agent that walks from its goal through poses, straight from each to the next, believes that they are.
+
+    It sums up the way by its compass and its odometer, which it reads every READING seconds.
+
+    Args:
+        poses: (n, 3) In the order of the walk (m, m, rad).
+        goal: (2,) Where the walk begins (m).
+        readings: The agent's compass and odometer.
+
+    Returns:
+        (n, 3) Of each pose: east and north of the goal (m), and the heading (rad).
+    """
+    legs = np.diff(np.vstack([goal, poses[:, :2]]), axis=0)
+    lengths, directions = np.hypot(*legs.T), np.arctan2(legs[:, 1], legs[:, 0])
+    parts = np.maximum(1, np.ceil(lengths / (READING * readings.senses.speed)).astype(int))
+    last = parts.cumsum() - 1  # part of each leg
+    heading, distance = readings.read(directions.repeat(parts), (lengths / parts).repeat(parts))
+    way = np.cumsum(distance[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    return np.column_stack([way[last], wrap_angle(poses[:, 2] + heading[last] - directions)])

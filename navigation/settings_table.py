@@ -45,6 +45,7 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "learning_walk_m": (float, "training.learning_walk"),
     "parallel_views": (int, "training.parallel_views"),
     "goal_walk_m": (float, "training.goal_walk"),
+    "goal_turns": (float, "training.goal_turns"),
     "goal_views": (int, "training.goal_views"),
     "goal_spread_deg": (float, "training.goal_spread"),
     "goal_only": (bool, "training.goal_only"),

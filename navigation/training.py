@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 TrainingViews = tuple[Float32[torch.Tensor, "m h w"], Float[np.ndarray, "m 3"]]  # encoded, and their poses
 AHEAD = 0.3  # m; a view next to the route faces the route this far ahead
 SIDES = (0.25, 0.5, 1.0)  # shares of the learning walk's reach at which views are taken, on both sides
-SPIRAL_START, SPIRAL_TURNS = 0.1, 2.0  # m from the goal, and turns, of a learning walk about it
+SPIRAL_START = 0.1  # m from the goal, of a learning walk about it
 BATCH = 64  # views rendered and encoded at once
 MIN_CONTRAST = 1e-3  # standard deviation of a feature image under which there is nothing to recognise
 WEAK_CONTRAST = 0.02  # .. and as a share of the median of all views, under which there is hardly anything
@@ -98,12 +98,14 @@ def poses_of_setup(setup: TrainingSetup, route: Route, field: Bounds | None = No
 
 
 def goal_walk_poses(setup: TrainingSetup, route: Route) -> Float[np.ndarray, "n 3"]:
-    """Poses (n, 3) of a learning walk about the route's end: a spiral of SPIRAL_TURNS turns that faces it (Le Moel and Wystrach 2020)."""
+    """Poses (n, 3) of a learning walk about the route's end: a spiral that faces it (Le Moel and Wystrach 2020)."""
     if not setup.goal_walk:
         return np.empty((0, 3))
     share = np.linspace(0, 1, setup.goal_views)
     radius = min(SPIRAL_START, setup.goal_walk) * (1 - share) + setup.goal_walk * share
-    direction = route.goal.heading + np.pi + 2 * np.pi * SPIRAL_TURNS * share  # it begins where the route comes from
+    direction = (
+        route.goal.heading + np.pi + 2 * np.pi * setup.goal_turns * share
+    )  # it begins where the route comes from
     spread = setup.goal_spread * np.random.default_rng(0).uniform(-1, 1, setup.goal_views)
     xy = np.array(route.goal[:2]) + radius[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
     return rounded(np.column_stack([xy, wrap_angle(direction + np.pi + spread)]))

@@ -19,8 +19,9 @@ class TrainingSetup:
         learning_walk: Reach of the learning walk to both sides of the route (m); 0 is training on the route only, as in the thesis.
         parallel_views: Number of views at each position of the route, spread evenly over the reach of the learning walk from one side to
             the other, all facing along the route. 0: the views of a learning walk, which face the route ahead.
-        goal_walk: Reach of a learning walk about the route's end (m): a spiral of two turns, from 0.1 m on, that faces the end, as about
-            a nest. It is learned before the route. 0: none.
+        goal_walk: Reach of a learning walk about the route's end (m): a spiral, from 0.1 m on, that faces the end, as about a nest. It
+            is learned before the route. 0: none.
+        goal_turns: Number of turns of the spiral.
         goal_views: Number of its views.
         goal_spread: They face up to this much to either side of the end, at random (rad).
         goal_only: Learn only its views, and none along the route.
@@ -31,6 +32,7 @@ class TrainingSetup:
     learning_walk: float = number(0.2, low=0, unit="m")
     parallel_views: int = whole(0, low=0, high=999)
     goal_walk: float = number(0.0, low=0, unit="m")
+    goal_turns: float = number(2.0, above=0)
     goal_views: int = whole(25, high=9999)
     goal_spread: float = number(0.0, low=0, high=math.pi, unit="rad")
     goal_only: bool = switch(False)

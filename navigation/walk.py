@@ -22,7 +22,7 @@ from tussock.world.geometry import Pose, Route
 from .body import Body
 from .displacement import Displacement
 from .encoding import Encoding
-from .senses import Senses
+from .sense_models import Senses
 from .steering.navigator import Images, Look, Motion, Navigator, PathIntegrating, check_motion
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread

@@ -1,5 +1,6 @@
 """One agent of a walk: where it is, what it has done so far, and each step that it makes."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,8 @@ from tussock.world.terrain import Terrain
 
 from .body import Body
 from .displacement import Displacement
-from .senses import Readings, Senses
+from .sense_models import Senses
+from .senses import Readings
 from .steering.navigator import Journey, Motion
 from .stop_check import StopCheck
 from .stopping import StoppingRules, StopReason
@@ -126,11 +128,11 @@ class Walker:
         return float(compass[0]), float(odometry[0])
 
     def way_out(self) -> Journey:
-        """The way from the goal to where its walk begins, as it measured it: back along the route, and straight from there."""
-        route = self.walk.route
-        back = route.at(np.arange(route.length, self.along, -self.body.step_length))[:, :2]
-        points = np.vstack([back, route.at(self.along)[:, :2], [self.pose[:2]]])
-        parts = np.diff(points, axis=0)
+        """The way from the goal to where its walk begins, as it measured it step by step: back along the route, and straight from there."""
+        route, step = self.walk.route, self.body.step_length
+        back = route.at(np.append(np.arange(route.length, self.along, -step), self.along))[:, :2]
+        aside = np.linspace(0, 1, max(1, math.ceil(self.deviation / step)) + 1)[1:, None] * (self.pose[:2] - back[-1])
+        parts = np.diff(np.vstack([back, back[-1] + aside]), axis=0)
         distances = np.hypot(*parts.T)
         parts, distances = parts[distances > 0], distances[distances > 0]
         compass, odometry = self.readings.read(np.arctan2(parts[:, 1], parts[:, 0]), distances)

@@ -38,6 +38,7 @@ KEYS = {
     "run": {
         "arrived", "reason", "steps", "mean_deviation_m", "max_deviation_m", "mean_error_deg", "resets", "cause", "poor_steps", "causes",
         "seconds", "steps_per_second", "recording", "max_view_distance_m",
+        "looks_per_m", "touches", "inward", "outward", "goal_m", "recovered",
     },
     "play": {"recording", "screenshot"},
     "sweep": {"table", "runs", "done_before", "arrived", "could_not_run", "seconds", "recordings"},

@@ -42,6 +42,7 @@ from tussock.navigation.studies.protocols.effects import over_routes
 from tussock.navigation.studies.protocols.lemoel2020 import GRID, MEMORIES
 from tussock.navigation.studies.protocols.lemoel2020 import of_walk as distance_from_nest
 from tussock.navigation.studies.protocols.protocol import check_models, route_names
+from tussock.navigation.sweeps.tables import compared_models
 from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
 from tussock.world.errors import SettingError
@@ -107,9 +108,12 @@ def test_baddeley_is_as_published():
 def test_azevedo_is_as_published():
     runs = runs_of(AZEVEDO2025)
     assert AZEVEDO2025.worlds == 75
-    assert len(runs) == 2 * 45
+    assert len(runs) == 2 * 4 * 45
     assert values(runs, "route_length_m") == {20}
-    assert values(runs, "scan_deg") == {160}
+    navigators = [run.navigator.make(model=run.make_model()) for run in runs[:: len(runs) // 8]][:4]
+    assert [type(each).__name__ for each in navigators] == ["Scan", "FamiliarityModulated", "CastAndSurge", "Lateral"]
+    assert [np.degrees(navigators[k].width) for k in (0, 2)] == pytest.approx([160, 160])
+    assert np.degrees(navigators[1].wide) == pytest.approx(160)
     assert len(values(runs, "world_seed")) == 2
     offsets = sorted(values(runs, "offset_m"))
     assert len(offsets) == 45
@@ -265,19 +269,76 @@ def test_routes_with_the_same_file_name_have_different_names():
     assert route_names(rows) == ["/a/route.csv", "/b/route.csv", "other", "route 4", "/a/route.csv"]
 
 
+def azevedo_walks(**columns):
+    """A table of walks by view-based orientation, where no other navigator is given."""
+    return walks(**{"model": "perfect-memory", "navigator": "scan width_deg=160"} | columns)
+
+
 def test_azevedo_by_hand():
-    table = walks(model="perfect-memory", offset_m=[-2.0, 2, -4, 4, 0]).assign(
+    table = azevedo_walks(offset_m=[-2.0, 2, -4, 4, 0]).assign(
         displacement_m=[1.0, 3, 5, 7, 0.5], last_displacement_m=[1.0, np.nan, np.nan, 4, 0.5]
     )
     results = AZEVEDO2025.measure(table)
-    rows = results.tables["by_start"].to_numpy().tolist()
+    rows = results.tables["by_start"].drop(columns="strategy").to_numpy().tolist()
     assert rows == [[0, 1, 0.5, 0.5, 1], [2, 2, 2, 1, 0.5], [4, 2, 6, 4, 0.5]]
-    assert holds(AZEVEDO2025, results) == {"no-approach": True}
-    assert results.numbers["share that got to the last 5 %"] == 0.6
+    untested = {"cast-and-surge-converges": None, "cast-and-surge-ends-closer": None}
+    assert holds(AZEVEDO2025, results) == {"no-approach": True} | untested
+    assert results.numbers["share that got to the last 5 %, view-based orientation"] == 0.6
     back = AZEVEDO2025.measure(table.assign(displacement_m=[7.0, 7, 1, 1, 9]))
-    assert holds(AZEVEDO2025, back) == {"no-approach": False}
+    assert holds(AZEVEDO2025, back)["no-approach"] is False
     one = AZEVEDO2025.measure(table[:1])
-    assert holds(AZEVEDO2025, one) == {"no-approach": None}
+    assert holds(AZEVEDO2025, one)["no-approach"] is None
+
+
+@pytest.mark.parametrize(("cast", "expected"), [(1.0, True), (3.0, False)])
+def test_azevedos_strategies_are_compared_within_worlds(cast, expected):
+    """Twelve worlds, in which agents stay farther from the route the higher the seed; casting takes 1 m off that, or adds 1 m."""
+    names = ["lateral gain=8.0", "cast-and-surge", "scan width_deg=160"]
+    rows = [
+        {"place": f"route {seed}", "navigator": name, "offset_m": offset, "displacement_m": seed + away}
+        for seed in range(12)
+        for name, away in zip(names, (2.0 + (-0.2) ** (seed % 2), cast, 2.0), strict=True)
+        for offset in (-3.0, 1.0, 2.0)
+    ]
+    table = pd.DataFrame(rows).assign(model="perfect-memory", arrived=False, steps=9)
+    table["last_displacement_m"] = table["displacement_m"].where(table["offset_m"] > 0)
+    results = AZEVEDO2025.measure(table)
+    assert list(dict.fromkeys(results.tables["walks"]["model"])) == [
+        "view-based orientation",
+        "cast and surge",
+        "lateral",
+    ]
+    differences = results.tables["differences"].set_index(["starts", "measure", "strategy"])
+    row = differences.loc["all starts", "mean displacement (m)", "cast and surge"]
+    assert (row["worlds"], row["less view-based orientation"]) == (12, cast - 2)
+    assert row["p (Holm)"] == pytest.approx(2 * 2 / 2**12)  # of both signs, and of two strategies
+    second = differences.loc["starts within 2 m, first 10 worlds", "mean displacement (m)", "cast and surge"]
+    assert second["worlds"] == 10
+    (within,) = {int(n) for n in results.tables["second"]["walks"]}
+    assert within == 10 * 2  # of each strategy
+    decided = holds(AZEVEDO2025, results)
+    assert decided["cast-and-surge-converges"] is expected
+    assert decided["cast-and-surge-ends-closer"] is expected
+
+
+def test_a_protocol_of_several_navigators_compares_these():
+    table = walks(
+        spec="perfect-memory",
+        model="perfect-memory",
+        navigator=["scan", "cast-and-surge"] * 6,
+        world="tiny",
+        seed=0,
+        route=None,
+        route_seed=np.repeat(range(6), 2),
+        world_seed=np.repeat(range(6), 2),
+        mean_deviation_m=[0.3, 0.1] * 6,
+    )
+    compared = compared_models(table, "navigator")
+    deviation = {name: each["mean_deviation_m"]["value"] for name, each in compared["navigators"].items()}
+    assert deviation == {"scan": pytest.approx(0.3), "cast-and-surge": pytest.approx(0.1)}
+    (pair,) = compared["pairs"]
+    assert (pair["first"], pair["second"], pair["better"]["mean_deviation_m"]) == ("cast-and-surge", "scan", 6)
+    assert list(compared_models(table)["models"]) == ["perfect-memory"]
 
 
 @pytest.fixture(scope="module")

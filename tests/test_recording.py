@@ -21,14 +21,20 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tussock.navigation.agent import Agent
+from tussock.navigation.displacement import Displacement
 from tussock.navigation.encoding import Encoding
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.recording import log
+from tussock.navigation.recording.blueprint import OF_A_SCAN, Shown
 from tussock.navigation.recording.columns import image_columns
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.recording.playback import play
+from tussock.navigation.recording.signals import HISTORY
 from tussock.navigation.recording.viewer import viewer_program
+from tussock.navigation.steering.navigator import Motion
+from tussock.navigation.stopping import StoppingRules
 from tussock.navigation.training import train, training_poses
+from tussock.navigation.walk import Walk
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import DiskFullError, FileError, InputError, MissingDependencyError
@@ -304,3 +310,98 @@ def test_a_walk_goes_on_when_its_live_viewer_is_closed(agent, tmp_path, port):
     with viewer_at(port, tmp_path / "received.rrd") as viewer, pytest.warns(UserWarning, match="viewer is gone"):
         walk_on(viewer)
     rerun("rrd", "verify", tmp_path / "r.rrd")
+
+
+class Reporting:
+    """A navigator that reports all kinds of signals."""
+
+    def learn(self, views):
+        pass
+
+    def begin(self):
+        return [0]
+
+    def decide(self, look, memories):
+        counts = np.array([memory[0] for memory in memories], dtype=float)
+        for memory in memories:
+            memory[0] += 1
+        signals = {
+            "left": counts / 10,
+            "home_x_m": 2 - counts,
+            "home_y_m": counts,
+            "food_vector": np.stack([counts, -counts], axis=1),
+            "tb1": counts[:, None] + np.arange(8),
+        }
+        return Motion(turn=np.zeros(len(look)), signals=signals)
+
+
+def test_what_a_navigator_steers_by_is_recorded(agent, tmp_path):
+    assert agent.trained.encoding is not None
+    walk = Walk(
+        renderer=agent.renderer,
+        encoding=agent.trained.encoding,
+        route=agent.route,
+        starts=[agent.start()],
+        stopping=StoppingRules(max_steps=5),
+        displacement=Displacement(at=0.02, left=0.2),
+    )
+    steps = [step for (step,) in walk.steps(Reporting()) if step is not None]
+    touched = [dataclasses.replace(step, touched=step.index in (1, 2, 4)) for step in steps]
+    path = tmp_path / "r.rrd"
+    with Recording(path, agent.renderer, agent.route) as recording:
+        for step in touched:
+            recording.log(step)
+    rerun("rrd", "verify", path)
+    (carried,) = [step.index for step in steps if step.displaced]
+    ahead = {step.index: step.goal_distance for step in steps}
+    assert values_in(path, "/goal/m@Scalars:scalars") == ahead
+    assert values_in(path, "/looks/headings@Scalars:scalars") == dict.fromkeys(ahead, 1)
+    assert values_in(path, "/signals/left@Scalars:scalars") == {k: k / 10 for k in ahead}
+    assert values_in(path, "/world/home@Arrows3D:vectors") == {k: [2 - k, k, 0] for k in ahead}
+    assert values_in(path, "/world/food_vector@Arrows3D:vectors") == {k: [k, -k, 0] for k in ahead}
+    places = values_in(path, "/world/agent@Arrows3D:origins")
+    assert values_in(path, "/world/home@Arrows3D:origins") == places
+    assert [*values_in(path, "/world/touched@Points3D:positions")] == [1, 2, 4]
+    assert [*values_in(path, "/world/carried@Points3D:positions")] == [carried]
+    assert carried not in values_in(path, "/world/path@LineStrips3D:strips")
+    maps = values_in(path, "/activity/tb1@Tensor:data")
+    for k in ahead:
+        assert (maps[k]["shape"], maps[k]["names"]) == ([8, HISTORY], ["value", "step"])
+        activity = np.array(maps[k]["buffer"], dtype=np.float32).reshape(8, HISTORY)
+        assert np.array_equal(activity[:, -1], k + np.arange(8))  # now is on the right
+        assert np.array_equal(activity[:, -k - 1], np.arange(8))
+        assert np.array_equal(activity[:, 0], np.arange(8))
+    events = values_in(path, "/events@TextLog:text")
+    assert [k for k, text in events.items() if "obstacle" in text] == [1, 4]  # where it begins
+    printed = rerun("rrd", "print", "-vvv", path)
+    assert "carried to the side" in printed
+
+
+def panels_of(recording: Path) -> set[str]:
+    """The names of the panels that a recording asks for, of all its layouts."""
+    printed = rerun("rrd", "print", "-vvv", recording)
+    return {name for name in PANELS if name in printed}
+
+
+PANELS = {
+    "The learned view it recognises",
+    "Familiarity by degrees to the right",
+    "What it steers by",
+    "Distance from the goal (m)",
+}
+
+
+def test_there_are_panels_for_what_there_is_only(agent, recorded, tmp_path):
+    assert panels_of(recorded[0]) == {"The learned view it recognises", "Familiarity by degrees to the right"}
+    (step, *_) = agent.walk(agent.start())
+    nothing = Shown()
+    assert nothing.with_step(step, learned=True) == OF_A_SCAN
+    assert nothing.with_step(step, learned=False) == Shown(scan=True)
+    signals = {"left": 0.5, "tb1": np.zeros(8), "home_vector": np.zeros(2), "food_x_m": 1.0, "food_y_m": 2.0}
+    steered = dataclasses.replace(step, match=None, familiarity=None, scanned=None, signals=signals)
+    shown = nothing.with_step(steered, learned=True)
+    assert shown == Shown(lines=("left", "food_x_m", "food_y_m"), maps=("tb1",), ways=("home_vector", "food"))
+    assert shown.with_step(steered, learned=True) == shown
+    with Recording(tmp_path / "r.rrd", agent.renderer, agent.route) as recording:
+        recording.log(steered)
+    assert {"What it steers by", "Distance from the goal (m)"} <= panels_of(tmp_path / "r.rrd")

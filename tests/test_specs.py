@@ -2,10 +2,12 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tussock.navigation.steering import NAVIGATORS
 from tussock.world.errors import SettingError
 from tussock.world.specs import (
     Spec,
@@ -158,3 +160,7 @@ def test_words_are_split_at_white_space_outside_parentheses():
 
 def test_a_spec_without_parameters_is_its_name():
     assert str(Spec("thing", Thing)) == "thing"
+
+
+def test_one_angle_in_degrees_is_one_of_several():
+    assert NAVIGATORS.spec("lateral bank_deg=45").make(model=None).bank == (pytest.approx(np.pi / 4),)

@@ -11,6 +11,7 @@ from tussock.navigation.sweeps.statistics import (
     axes_of,
     by_axis,
     choice_label,
+    measures_of,
     pairings,
     setting_label,
     summary,
@@ -65,6 +66,53 @@ def test_models_are_compared_on_runs_that_are_equal_in_everything_else():
     assert (arrived.better, arrived.worse, arrived.effect) == (0, 6, -0.5)
     assert (deviation.better, deviation.worse, deviation.effect) == (0, 12, -1)
     assert arrived.p == deviation.p == arrived.corrected_p == 2 / 2**6  # all worlds point one way
+
+
+def test_what_there_is_nothing_to_say_of_is_not_shown():
+    always = ["arrived", "mean_deviation_m", "mean_error_deg"]
+    row = dict.fromkeys(always, 0.0) | {
+        "navigator": "scan",
+        "resets": 0,
+        "looks_per_m": 1800.0,
+        "touches": 0,
+        "recovered": None,
+    }
+    row |= {"inward": None, "outward": 0.5}
+
+    def shown(*changes):
+        return measures_of(table_of({str(k): row | change for k, change in enumerate(changes)}))
+
+    assert shown({}, {}) == always
+    assert shown({}, {"resets": 1}) == [*always, "resets"]
+    assert shown({}, {"touches": 2}) == [*always, "touches"]
+    assert shown({}, {"recovered": False}) == [*always, "recovered"]
+    assert shown({}, {"navigator": "lateral"}) == [*always, "looks_per_m", "inward", "outward"]
+    assert shown({"navigator": "scan every=3"}) == [*always, "looks_per_m", "inward", "outward"]
+    # A folder of an earlier version has no such columns.
+    old = pd.DataFrame([{name: row[name] for name in (*always, "resets")} | {"navigator": "mine:Navigator"}])
+    assert measures_of(old) == always
+
+
+def test_measures_that_some_runs_do_not_have_are_over_the_others():
+    rows = [
+        {"navigator": name, "world": "tiny", "world_seed": seed, "route": None, "route_seed": None, "seed": 0,
+         "recovered": None if seed == 0 else name == "good", "inward": None if seed == 1 else 0.5 + 0.1 * (name == "good") * seed,
+         "outward": None}
+        for name in ("bad", "good") for seed in range(9)
+    ]  # fmt: skip
+    frame = table_of({str(k): row for k, row in enumerate(rows)})
+    measures = ["recovered", "inward", "outward"]
+    both = summary(frame, measures).intervals
+    assert both["recovered"].value == 0.5
+    assert np.isnan(both["outward"].value)
+    (pair,) = pairings(frame, ["navigator", "world_seed"], measures, ["navigator"])
+    found = pair.differences
+    assert found["recovered"].interval.value == -1
+    assert (found["recovered"].better, found["recovered"].worse) == (0, 8)
+    assert (found["inward"].better, found["inward"].worse) == (0, 7)  # the more the better; the first world is alike
+    assert (found["outward"].better, found["outward"].worse) == (0, 0)
+    pair_table([plain_json(pairing_numbers(pair))], measures)
+    along_axis(frame, ["navigator"], measures, [])
 
 
 def test_p_values_are_corrected_for_all_pairs():

@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from tussock import world as world_package
+from tussock.world import params
 from tussock.world.errors import InputError, SettingError
 from tussock.world.files import open_world
 from tussock.world.generate import _thinned, plant_layout
@@ -26,7 +27,7 @@ from tussock.world.scene import Ground, World
 from tussock.world.settings import describe
 
 KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree"}
-PRESETS = {name: WORLDS.find(name)() for name in WORLDS.builtin}
+PRESETS = {name: WORLDS.find(name)() for name in params.PRESETS}
 
 
 @cache

@@ -157,9 +157,13 @@ TINY = partial(  # fewer than 200 triangles for any seed
     stone_density=0.0, trees=7, tree_height=1.3, tree_distance=0.9, tree_leaves=8,
 )  # fmt: skip
 
-# A preset returns WorldParams, or takes a seed and returns a World.
+# A preset returns WorldParams, as these do, or takes a seed and returns a World.
 PRESETS = {"tussock-field": "WorldParams", "meadow": "MEADOW", "scrub": "SCRUB", "tiny": "TINY"}
-WORLDS = Registry("worlds", "world", {name: f"{__name__}:{where}" for name, where in PRESETS.items()})
+WORLDS = Registry(
+    "worlds",
+    "world",
+    {name: f"{__name__}:{where}" for name, where in PRESETS.items()} | {"orchard": "tussock.world.orchard:orchard"},
+)
 
 
 def is_generated(text: str) -> bool:
@@ -192,4 +196,4 @@ def _check_parameters(spec: Spec) -> None:
 
 def preset_of(params: WorldParams) -> str | None:
     """The name of tussock's preset that has these parameters, or None."""
-    return next((name for name in WORLDS.builtin if WORLDS.find(name)() == params), None)
+    return next((name for name in PRESETS if WORLDS.find(name)() == params), None)

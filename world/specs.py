@@ -131,13 +131,13 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
             raise SettingError(f"{name} has no parameter {key!r}; its parameters are {', '.join(own) or 'none'}")
         if key in parameters:
             raise SettingError(f"{key} is given twice; give it once")
-        parameters[key] = _radians(word, value) if in_degrees else parse_value(value, own.get(key))
+        parameters[key] = _radians(word, value, own.get(key)) if in_degrees else parse_value(value, own.get(key))
     return parameters
 
 
-def _radians(word: str, text: str) -> Any:
+def _radians(word: str, text: str, default: Any) -> Any:
     """The angle or angles (rad) of a parameter that is given in degrees. Raises SettingError for anything but numbers."""
-    value = parse_value(text, 0.0)
+    value = parse_value(text, (0.0,) if isinstance(default, tuple) else 0.0)
     try:
         return tuple(map(math.radians, value)) if isinstance(value, tuple) else math.radians(value)
     except TypeError as error:

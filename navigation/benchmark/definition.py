@@ -19,6 +19,7 @@ from ..stopping import StoppingRules
 from ..sweeps.spec import Sweep
 from ..training_setup import TrainingSetup
 
+NAVIGATOR = "scan"  # of entries that choose none
 # All settings of a run are given here, in `Benchmark.sweep`, or by the entry, so that no default is relied on.
 BASE = Experiment(
     world_seed=None,
@@ -27,7 +28,7 @@ BASE = Experiment(
     route_seed=None,
     eye=Eye(width=360, height=75, samples=1, z=0.01, top=math.radians(60.0), bottom=math.radians(-15.0)),
     encoding="edges",
-    navigator="scan",
+    navigator=NAVIGATOR,
     route_length=8.0,
     training=TrainingSetup(spacing=0.4, every=1, learning_walk=0.2),
     body=Body(step_length=0.05),
@@ -41,7 +42,11 @@ BASE = Experiment(
 ENCODING = "edges"  # of entries that choose none
 EARLY = {"world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m"}  # as old as the benchmarks
 # Settings newer than the benchmarks: where they are as by default, the digest is as it was before them.
-LATER = {*ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m"} - EARLY
+LATER = {
+    *ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m", "goal_walk_m", "goal_turns", "goal_views",
+    "goal_spread_deg", "goal_only",
+    "collisions", "body_radius_m", "senses", "release_m", "release_deg", "displace_at", "displace_m",
+} - EARLY  # fmt: skip
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
 
 
@@ -66,14 +71,14 @@ class Benchmark:
     def __len__(self) -> int:
         return len(self.worlds) * len(self.noises_deg) * len(self.displacements)
 
-    def sweep(self, model: str = "perfect-memory", encoding: str = ENCODING) -> Sweep:
-        """The runs of a model."""
+    def sweep(self, model: str = "perfect-memory", encoding: str = ENCODING, navigator: str = NAVIGATOR) -> Sweep:
+        """The runs of a model and a navigator."""
         axes = {
             "world": [{"world": world, "seed": seed} for world, seed in self.worlds],
             "heading_noise": [{"body__heading_noise": math.radians(noise)} for noise in self.noises_deg],
             "start_offset": self.displacements,
         }
-        return Sweep.over(self.name, self.base.replace(model=model, encoding=encoding), axes)
+        return Sweep.over(self.name, self.base.replace(model=model, encoding=encoding, navigator=navigator), axes)
 
     def by_world(self, encoding: str = ENCODING) -> Iterator[list[Experiment]]:
         """The runs, those of one world together. Their model is for the entry to bring."""

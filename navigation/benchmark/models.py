@@ -13,11 +13,12 @@ from ..experiment_fields import MODEL_SUFFIX
 from ..experiment_keys import key_of
 from ..models import model_spec
 from ..models.base import FamiliarityModel
+from ..steering import NAVIGATORS
 from ..sweeps.spec import Sweep
 from ..sweeps.store import Store
 from ..sweeps.sweep import run_sweep
 from ..sweeps.work import draw, learn, walk
-from .definition import BENCHMARK, ENCODING, Benchmark
+from .definition import BENCHMARK, ENCODING, NAVIGATOR, Benchmark
 from .results import Result, check_free, result_of, write_result
 
 
@@ -26,6 +27,7 @@ def enter_named(
     out: Path,
     *,
     encoding: str = ENCODING,
+    navigator: str = NAVIGATOR,
     benchmark: Benchmark = BENCHMARK,
     workers: str | int | None = None,
     progress: Progress = no_progress,
@@ -36,6 +38,7 @@ def enter_named(
         names: For example "mushroom-body inputs=10", or "package.module:Class".
         out: Folder for the runs, which are kept as a sweep keeps them, and for the results, in `out`/results.
         encoding: What the models get of a view.
+        navigator: What steers by them; one other than a scan is part of the entry's name.
         benchmark: What is asked.
         workers: See `run_sweep`.
         progress: Called with how many runs are finished, of how many.
@@ -47,13 +50,15 @@ def enter_named(
         InputError: Where there is a result of another version, or of another entry under the same name.
     """
     chain = benchmark.chain(encoding)
-    entries = list(dict.fromkeys(map(checked_entry, names)))
+    models = list(dict.fromkeys(map(checked_entry, names)))
+    steers = str(NAVIGATORS.spec(navigator))
+    entries = {model if steers == NAVIGATOR else f"{model}, {steers}": model for model in models}
     for entry in entries:
         check_free(out, benchmark, entry, chain)
-    sweeps = {entry: benchmark.sweep(entry, encoding) for entry in entries}
+    sweeps = {entry: benchmark.sweep(model, encoding, steers) for entry, model in entries.items()}
     runs = [run for sweep in sweeps.values() for run in sweep.experiments]
     try:
-        run_sweep(Sweep(benchmark.name, {"model": entries}, runs), out, workers=workers, progress=progress)
+        run_sweep(Sweep(benchmark.name, {"model": models}, runs), out, workers=workers, progress=progress)
     except InputError:
         with suppress(InputError):  # what ended the sweep matters more
             _results(sweeps, out, benchmark, chain)  # of the entries that are complete

@@ -20,6 +20,8 @@ class BenchmarkCommand(WorkerOptions):
     """Folder for the runs and, in its folder results, for the results; runs that are finished there are not done again."""
     encoding: str = "edges"
     """What the models get of a view: edges, grey or sky, or a chain of steps. The eye is the test bed's."""
+    navigator: str = "scan"
+    """What steers by the models, as in 'lateral gain=4'; another than scan is named in the result."""
     quick: bool = False
     """A first look: other, fewer runs, whose results compare with no others."""
     leaderboard: Path | None = None
@@ -52,7 +54,13 @@ class BenchmarkCommand(WorkerOptions):
         message(f"{', '.join(dict.fromkeys(names))}: {len(benchmark)} runs of {benchmark.name} each")
         with progress("walking", "runs", verbose=True) as report:
             entered = enter_named(
-                names, self.out, encoding=self.encoding, benchmark=benchmark, workers=workers, progress=report
+                names,
+                self.out,
+                encoding=self.encoding,
+                navigator=self.navigator,
+                benchmark=benchmark,
+                workers=workers,
+                progress=report,
             )
         for result, _ in entered:
             errors = [run.error for run in result.runs if run.error is not None]

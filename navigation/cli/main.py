@@ -45,6 +45,7 @@ COMMANDS: dict[str, Any] = {
         {
             "thesis": "studies:ThesisCommand",
             "knight2019": "published_images:Knight2019Command",
+            "stone2017": "worldless:Stone2017Command",
         },  # and the protocols: see `commands_for`
     ),
     "study": "studies:StudyCommand",

@@ -26,7 +26,7 @@ from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny), generated from a seed; its parameters may follow, as in "
+    "A preset's name (tussock-field, meadow, scrub, tiny, orchard), generated from a seed; its parameters may follow, as in "
     "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
 )
 
@@ -187,6 +187,8 @@ class LearningOptions(SourceOptions):
     """In place of the learning walk's views, learn N at each position, spread over its reach and facing along the route. 0: its own."""
     goal_walk_m: float = default(TrainingSetup, "goal_walk")
     """Also learn views on a spiral about the end of the route, from 0.1 m to this far away, that face the end; 0 is none."""
+    goal_turns: float = default(TrainingSetup, "goal_turns")
+    """Number of turns of this spiral."""
     goal_views: int = default(TrainingSetup, "goal_views")
     """Number of views on this spiral."""
     goal_spread_deg: float = degrees(default(TrainingSetup, "goal_spread"))

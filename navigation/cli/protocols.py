@@ -115,7 +115,7 @@ class ProtocolCommand(WorkerOptions, MeshOptions):
             "Paper": protocol.paper,
             "World": f"{world}, generated" if is_generated(world) else world,
             "Routes": ", ".join(map(str, self.routes())) or f"{count}, generated, {seeds}",
-            "Walks": f"{len(sweep):,}",
+            "Walks": f"{len(sweep) * (2 if protocol.both_ways else 1):,}",
         }
         if self.as_published:
             about["Variant"] = "as published"

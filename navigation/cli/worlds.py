@@ -21,7 +21,7 @@ class WorldCommand(Command):
     out: Path
     """File to write: .glb or .ply."""
     preset: str = "tussock-field"
-    """tussock-field, meadow, scrub or tiny."""
+    """tussock-field, meadow, scrub, tiny or orchard."""
     seed: int = 0
     """The same seed gives the same file."""
     picture: Path | None = None

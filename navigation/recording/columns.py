@@ -39,16 +39,36 @@ def bar_chart_columns(charts: Float32[np.ndarray, "n width"]) -> Iterable[rr.Com
     Args:
         charts: (n, width) Their values.
     """
-    count, width = charts.shape
+    return rr.BarChart.columns(values=_tensors(charts))
+
+
+def heat_map_columns(maps: Float32[np.ndarray, "n h w"], down: str, right: str) -> Iterable[rr.ComponentColumn]:
+    """Heat maps.
+
+    Args:
+        maps: (n, h, w) Their values.
+        down: What their rows are.
+        right: What their columns are.
+    """
+    return rr.Tensor.columns(data=_tensors(maps, (down, right)))
+
+
+def _tensors(values: Float32[np.ndarray, " n *shape"], names: Sequence[str] = ()) -> pa.StructArray:
+    """Arrays (n) of one shape, as rerun keeps them, with names of their dimensions."""
+    count, shape = len(values), values.shape[1:]
     kind = rr.components.TensorData.arrow_type()
     numbers = kind.field("buffer").type
     code = [field.name for field in numbers].index("F32")
     rows = np.arange(count + 1, dtype=np.int32)
     children = [pa.nulls(0, field.type) for field in numbers]
-    children[code] = pa.ListArray.from_arrays(rows * width, charts.reshape(-1), type=numbers.field(code).type)
+    flat = values.reshape(-1)
+    children[code] = pa.ListArray.from_arrays(
+        rows * (values[0].size if count else 0), flat, type=numbers.field(code).type
+    )
     codes = pa.py_buffer(np.full(count, code, dtype=np.int8))
-    values = pa.Array.from_buffers(numbers, count, [None, codes, pa.py_buffer(rows)], children=children)
-    shape = kind.field("shape").type
-    shapes = pa.ListArray.from_arrays(rows, np.full(count, width, dtype=np.uint64), type=shape)
-    names = pa.nulls(count, kind.field("names").type)
-    return rr.BarChart.columns(values=pa.StructArray.from_arrays([shapes, names, values], fields=list(kind)))
+    buffers = pa.Array.from_buffers(numbers, count, [None, codes, pa.py_buffer(rows)], children=children)
+    sizes = np.tile(np.array(shape, dtype=np.uint64), count)
+    shapes = pa.ListArray.from_arrays(rows * len(shape), sizes, type=kind.field("shape").type)
+    kinds = kind.field("names").type
+    named = pa.array([list(names)] * count, kinds) if names else pa.nulls(count, kinds)
+    return pa.StructArray.from_arrays([shapes, named, buffers], fields=list(kind))

@@ -19,15 +19,17 @@ from jaxtyping import Float, Int64
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import DiskFullError
-from tussock.world.geometry import Pose, Route, turn_of_columns
+from tussock.world.geometry import Route, turn_of_columns
 from tussock.world.scene import World
 
-from ..failures import Cause, Diagnosis
+from ..failures import Diagnosis
 from ..stopping import StopReason
 from ..training import training_source
 from ..walker import Step
-from .blueprint import CAUSE_COLOURS, TIMELINE, blueprint, cause_entity, image_format
+from .blueprint import MARKS, OF_A_SCAN, TIMELINE, Shown, blueprint, image_format
 from .columns import bar_chart_columns, image_columns
+from .marks import Marks, events_of
+from .signals import SignalLog
 from .viewer import check_viewer
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
@@ -35,9 +37,7 @@ VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
 FLUSH_SECONDS = 0.5  # how often steps are brought to disk; a crash may lose those of twice as long
 BATCH = 32  # steps whose views are sent at once: fresh memory for more of them takes longer than copying them
 MAX_FLUSH_SECONDS = 120.0  # rerun's writer sometimes ends without an answer where the disk is full
-ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible ..
-MARKS_ABOVE = 0.04  # m; .. and marks of poor steps above these
-LABEL_SPACING = 0.6  # m; marks of one cause nearer than this to the one with its name have none
+ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
 
 
 class Recording:
@@ -72,7 +72,10 @@ class Recording:
         self._new: list[tuple[Step, Diagnosis | None]] = []  # steps that the thread has not got yet,
         self._waiting: list[tuple[Step, Diagnosis | None]] = []  # and those of which it has sent only the views
         self._previous: Step | None = None
-        self._labelled: tuple[Cause, Pose] | None = None  # the cause that was last written at its mark, and where
+        self._touching = False  # whether an obstacle stopped or turned the step before the last look
+        self._marks, self._signals = Marks(self._send), SignalLog(self._send, self._log)
+        self._route, self._max_deviation = route, max_deviation
+        self._shown, self._layout = Shown(), OF_A_SCAN  # what the steps have, and what is laid out
         self._streams = [rr.RecordingStream("tussock")]
         layout = blueprint(route, max_deviation)
         self._streams[0].save(path, default_blueprint=layout)
@@ -142,13 +145,14 @@ class Recording:
         """Send the views of some steps, and, with a flush, what is left of all; called in the thread, as all that it calls."""
         if steps and self._previous is None and not self._waiting:
             self._log_constants(steps[0][0])
+        self._lay_out([step for step, _ in steps])
         self._waiting += steps
         self._send_views([step for step, _ in steps])
         if flush:
             waiting, self._waiting = self._waiting, []
             if waiting:
                 self._send_steps([step for step, _ in waiting])
-                self._send_causes([(step, diagnosis) for step, diagnosis in waiting if diagnosis is not None])
+                self._marks.write(waiting)
                 self._log_events(waiting)
             self._flush()
 
@@ -189,8 +193,8 @@ class Recording:
         names = {"deviation/m": "deviation from the route (m)", "error/degrees": "heading error (degrees)"}
         for (entity, name), colour in zip(names.items(), (PATH_COLOUR, MATCH_COLOUR), strict=True):
             self._log(entity, rr.SeriesLines(names=name, colors=colour), static=True)
-        for cause, colour in CAUSE_COLOURS.items():
-            self._log(cause_entity(cause), rr.Points3D.from_fields(colors=colour, radii=0.03), static=True)
+        for entity, colour in MARKS.items():
+            self._log(entity, rr.Points3D.from_fields(colors=colour, radii=0.03), static=True)
         if title:
             self._log("about", rr.TextDocument(title, media_type="text/markdown"), static=True)
 
@@ -217,7 +221,7 @@ class Recording:
         facing = _directions(np.array([step.pose.heading + step.turn for step in steps]), 0.2)
         self._send("world/agent", steps, rr.Arrows3D.columns(origins=here, vectors=facing))
         known = steps if self._previous is None else [self._previous, *steps]
-        walked = [(before, step) for before, step in pairwise(known) if step.reset is None]
+        walked = [(before, step) for before, step in pairwise(known) if step.reset is None and not step.displaced]
         strips = [np.array([_place(before), _place(step)]) for before, step in walked]
         self._send("world/path", [step for _, step in walked], rr.LineStrips3D.columns(strips=strips))
         matched = [step for step in steps if step.match is not None]
@@ -227,6 +231,9 @@ class Recording:
             self._send("world/recognised", matched, arrows)
         self._send("deviation/m", steps, rr.Scalars.columns(scalars=[step.deviation for step in steps]))
         self._send("error/degrees", steps, rr.Scalars.columns(scalars=np.degrees([step.error for step in steps])))
+        self._send("goal/m", steps, rr.Scalars.columns(scalars=[step.goal_distance for step in steps]))
+        self._send("looks/headings", steps, rr.Scalars.columns(scalars=[step.looks for step in steps]))
+        self._signals.write(steps, {step.index: _place(step) for step in steps})
         scans = [(step, step.familiarity) for step in steps if step.familiarity is not None]
         if scans:
             charts = np.stack([familiarity for _, familiarity in scans])
@@ -247,22 +254,6 @@ class Recording:
             )
             self._send("recognised", matched, image_columns(eye, list(views)))
 
-    def _send_causes(self, poor: list[tuple[Step, Diagnosis]]) -> None:
-        """A mark where a step is poor or failed, in the colour of its cause; the first of several close marks has its name."""
-        marks: dict[Cause, list[tuple[Step, str]]] = {}
-        for step, diagnosis in poor:
-            cause = diagnosis.cause
-            last, where = self._labelled or (None, step.pose)
-            close = last == cause and np.hypot(step.pose.x - where.x, step.pose.y - where.y) < LABEL_SPACING
-            marks.setdefault(cause, []).append((step, "" if close else cause.value))
-            self._labelled = self._labelled if close else (cause, step.pose)
-        for cause, marked in marks.items():
-            steps, labels = [step for step, _ in marked], [label for _, label in marked]
-            positions = [_place(step, MARKS_ABOVE) for step in steps]
-            shown = [label != "" for label in labels]
-            columns = rr.Points3D.columns(positions=positions, labels=labels, show_labels=shown)
-            self._send(cause_entity(cause), steps, columns)
-
     def _above(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
         """Points a little above the ground."""
         return np.column_stack([xy, self._renderer.world.ground_height(xy) + ABOVE])
@@ -270,13 +261,21 @@ class Recording:
     def _log_events(self, steps: list[tuple[Step, Diagnosis | None]]) -> None:
         """What happened at a step, where anything did."""
         for step, diagnosis in steps:
-            events = [step.reset and f"{step.reset}: put back on the route", step.reason or step.failure]
-            events += [] if diagnosis is None else [str(diagnosis)]
             level = rr.TextLogLevel.INFO if step.reason == StopReason.ARRIVED else rr.TextLogLevel.WARN
-            for event in filter(None, events):
+            for event in events_of(step, diagnosis, touching=self._touching):
                 for stream in self._streams:
                     stream.set_time(TIMELINE, sequence=step.index)
                 self._log("events", rr.TextLog(f"step {step.index}: {event}", level=level))
+            self._touching = step.touched
+
+    def _lay_out(self, steps: list[Step]) -> None:
+        """Make panels for what there is to show, where the steps have something that earlier ones do not."""
+        for step in steps:
+            self._shown = self._shown.with_step(step, learned=self._training_poses is not None)
+        if steps and self._shown != self._layout:
+            self._layout = self._shown
+            for stream in self._streams:
+                stream.send_blueprint(blueprint(self._route, self._max_deviation, self._shown))
 
 
 def _place(step: Step, above: float = ABOVE) -> tuple[float, float, float]:

@@ -1,5 +1,11 @@
+from .average_landmark_vector import AverageLandmarkVector as AverageLandmarkVector
 from .blend import Blend as Blend
+from .cast_and_surge import CastAndSurge as CastAndSurge
 from .central_complex import CentralComplexSteering as CentralComplexSteering
+from .familiarity_modulated import FamiliarityModulated as FamiliarityModulated
+from .home_vector import HomeVector as HomeVector
+from .homing import Homing as Homing
+from .image_gradient import ImageGradient as ImageGradient
 from .lateral import Lateral as Lateral
 from .loop_breaker import LoopBreaker as LoopBreaker
 from .navigator import Journey as Journey

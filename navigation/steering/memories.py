@@ -64,8 +64,21 @@ class Memory:
 
     def unfamiliarity(self, views: Images) -> Float[np.ndarray, " n"]:
         """Unfamiliarity of views (n, h, w) at their present heading: 0 as of learned views, 1 as of views that face the other way."""
+        return self.unfamiliarity_of(self.familiarity(views))
+
+    def unfamiliarity_of(self, familiarity: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+        """Unfamiliarity of views that the model has scored already, as in a scan."""
         spread = max(self.familiar - self.unfamiliar, 1e-12)
-        return ((self.familiar - self.familiarity(views)) / spread).clip(-LIMIT, LIMIT)
+        return ((self.familiar - familiarity) / spread).clip(-LIMIT, LIMIT)
+
+
+def learned_before(memory: Memory | None, navigator: object) -> Memory:
+    """The memory of a navigator, once it has learned. Raises SettingError before that, as where its model comes from a file."""
+    if memory is None:
+        raise SettingError(
+            f"{type(navigator).__name__} has not learned how familiar its views are; let it learn, with a model's name in place of a file"
+        )
+    return memory
 
 
 def turned(views: Images, angles: Sequence[float]) -> Float32[torch.Tensor, "nk h w"]:

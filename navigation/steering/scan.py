@@ -61,17 +61,8 @@ class Scan:
 
     def _scanned(self, look: Look, memories: Sequence[Any]) -> Motion:
         """Turn each agent to its most familiar heading."""
-        width = look.views.shape[2]
-        windows = self._windows(width, look)
-        familiarity, matches = self._compare(look.views, windows, memories)
-        if self.coarse:
-            windows = coarse_to_fine(familiarity, windows, max(1, round(float(columns_of_turn(self.coarse, width)))))
-        turn = best_turn(familiarity, windows, interpolate=self.refine)
-        columns = np.rint(columns_of_turn(turn, width)).astype(int) % width
-        match = None if matches is None else matches[np.arange(len(look)), columns]
-        progress = [None if memory is None else memory.progress for memory in memories]
-        record = ScanRecord(familiarity=familiarity, window=windows, match=match, progress=progress)
-        return Motion(turn=turn, scan=record, certainty=_peaked(familiarity))
+        windows = self._windows(look.views.shape[2], look)
+        return scan_motion(self.model, look.views, windows, memories, refine=self.refine, coarse=self.coarse)
 
     def _windows(self, width: int, look: Look) -> Bool[np.ndarray, "n w"]:
         """Which rotations each agent compares."""
@@ -80,18 +71,56 @@ class Scan:
         turns = wrap_angle(self.about - look.compass)
         return np.stack([scan_window(width, self.width, float(turn)) for turn in turns])
 
-    def _compare(
-        self, views: Images, windows: Bool[np.ndarray, "n w"], memories: Sequence[Any]
-    ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Familiarity (n, w) of every rotation, and the learned view that each resembles (n, w), where the model keeps views."""
-        if memories and memories[0] is not None:
-            rows = zip(memories, views, windows, strict=True)
-            familiarity, matches = zip(*(memory.look(view, window) for memory, view, window in rows), strict=True)
-            return torch.stack(familiarity).cpu().numpy(), torch.stack(matches).cpu().numpy()
-        if isinstance(self.model, SnapshotModel):
-            familiarity, matches = self.model.match(views, windows)
-            return familiarity.cpu().numpy(), matches.cpu().numpy()
-        return self.model.scan(views).cpu().numpy(), None
+
+def scan_motion(
+    model: FamiliarityModel,
+    views: Images,
+    windows: Bool[np.ndarray, "n w"],
+    memories: Sequence[Any],
+    *,
+    refine: bool = True,
+    coarse: float = 0.0,
+) -> Motion:
+    """A turn to the most familiar rotation of each view.
+
+    Args:
+        model: What tells how familiar a view is at each rotation.
+        views: (n, h, w) Of the agents.
+        windows: (n, w) The rotations that each of them chooses from.
+        memories: Where each is along a learned sequence; None where the model keeps none.
+        refine: As of `Scan`.
+        coarse: As of `Scan` (rad).
+    """
+    width = views.shape[2]
+    familiarity, matches = _compare(model, views, windows, memories)
+    if coarse:
+        windows = coarse_to_fine(familiarity, windows, max(1, round(float(columns_of_turn(coarse, width)))))
+    turn = best_turn(familiarity, windows, interpolate=refine)
+    columns = np.rint(columns_of_turn(turn, width)).astype(int) % width
+    match = None if matches is None else matches[np.arange(len(views)), columns]
+    progress = [None if memory is None else memory.progress for memory in memories]
+    record = ScanRecord(familiarity=familiarity, window=windows, match=match, progress=progress)
+    return Motion(turn=turn, scan=record, certainty=_peaked(familiarity))
+
+
+def best_familiarity(motion: Motion) -> Float[np.ndarray, " n"]:
+    """Familiarity of the rotation that each agent's scan chose."""
+    assert motion.scan is not None
+    return np.where(motion.scan.window, motion.scan.familiarity, -np.inf).max(axis=1).astype(float)
+
+
+def _compare(
+    model: FamiliarityModel, views: Images, windows: Bool[np.ndarray, "n w"], memories: Sequence[Any]
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Familiarity (n, w) of every rotation, and the learned view that each resembles (n, w), where the model keeps views."""
+    if memories and memories[0] is not None:
+        rows = zip(memories, views, windows, strict=True)
+        familiarity, matches = zip(*(memory.look(view, window) for memory, view, window in rows), strict=True)
+        return torch.stack(familiarity).cpu().numpy(), torch.stack(matches).cpu().numpy()
+    if isinstance(model, SnapshotModel):
+        familiarity, matches = model.match(views, windows)
+        return familiarity.cpu().numpy(), matches.cpu().numpy()
+    return model.scan(views).cpu().numpy(), None
 
 
 def _peaked(familiarity: Float32[np.ndarray, "n w"]) -> Float[np.ndarray, " n"]:

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from tussock.world.geometry import wrap_angle
 
-from ..steering.ring_circuit import Activity, CentralComplex
+from ..steering.ring_circuit import NOISES, Activity, CentralComplex
 
 CONCENTRATION = 100.0  # of the von Mises distribution of turns
 FILTER = 0.4  # share of the turn before in each turn
@@ -101,6 +101,11 @@ def home_vector_errors(
 ) -> HomeVectorErrors:
     """How far the home vectors of a circuit are from the true ones; arguments as `home_vectors`."""
     vectors, _ = home_vectors(circuit, flight, steps, random)
+    return errors_of(vectors, flight, steps)
+
+
+def errors_of(vectors: Float[np.ndarray, "n k 2"], flight: Flight, steps: np.ndarray) -> HomeVectorErrors:
+    """How far home vectors are from the true ones, after each of some numbers of steps (k,) of a flight."""
     home = -flight.position[:, steps - 1]
     lengths = np.linalg.norm(flight.velocity, axis=2).cumsum(axis=1)
     bearing = np.arctan2(vectors[..., 1], vectors[..., 0]) - np.arctan2(home[..., 1], home[..., 0])
@@ -141,5 +146,5 @@ def _perceive(
     """The activity after a step of time with a heading and a velocity."""
     cos, sin = np.cos(heading), np.sin(heading)
     forward, left = cos * velocity[:, 0] + sin * velocity[:, 1], cos * velocity[:, 1] - sin * velocity[:, 0]
-    noise = circuit.draw([random] * len(heading)) if circuit.noise else None
+    noise = random.standard_normal((len(heading), NOISES)) if circuit.noise else None
     return circuit.update(activity, heading, forward, left, np.ones(len(heading)), noise)

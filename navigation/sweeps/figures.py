@@ -22,7 +22,7 @@ from ..reports.drawing import (
     legend_above,
 )
 from ..reports.maps import draw_map, draw_route, map_axes
-from .statistics import MEASURES, axis_label, by_axis, choice_label
+from .statistics import MEASURES, SHARES, axis_label, by_axis, choice_label
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)
 MAX_LABELS = 24  # an axis with more choices has no labels
@@ -67,7 +67,7 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
     for measure, panel in panels.items():
         panel.set_ylabel(MEASURES[measure])
         panel.grid(axis="y", color="#00000018")
-        if measure == "arrived":
+        if measure in SHARES:
             panel.set_ylim(-0.05, 1.05)
         else:
             from_zero(panel)

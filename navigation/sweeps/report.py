@@ -15,6 +15,7 @@ from ..reports.report import RESULTS as REPLICATION_RESULTS
 from ..reports.results import plain_json
 from .figures import along_axis
 from .statistics import (
+    IN_TABLES,
     MAX_CHOICES,
     axes_of,
     axis_label,
@@ -129,12 +130,12 @@ def _columns(completed: pd.DataFrame, axes: dict[str, list[str]], label: str) ->
 
 
 def _compared(completed: pd.DataFrame, axes: dict[str, list[str]]) -> list[str]:
-    """The settings of the axis whose choices are compared in pairs: that of models, or else that of encodings, or none.
+    """The settings of the axis whose choices are compared in pairs: that of models, or else of navigators or of encodings, or none.
 
     An axis with too many choices to show each is not compared.
     """
     few = [names for label, names in axes.items() if _columns(completed, axes, label) == names]
-    return next((names for wanted in ("model", "encoding") for names in few if wanted in names), [])
+    return next((names for wanted in ("model", "navigator", "encoding") for names in few if wanted in names), [])
 
 
 def arrivals(completed: pd.DataFrame, by: list[str]) -> str:
@@ -201,7 +202,7 @@ def _blocks(
     blocks: list[Block] = [Text(INTERVALS, style="soft")]
     blocks += [_axis(completed, label, axes, measures, results["by"][label]) for label in axes]
     if results["pairs"]:
-        pairs = [Text(PAIRS, style="soft"), pair_table(results["pairs"], measures)]
+        pairs = [Text(PAIRS, style="soft"), pair_table(results["pairs"], _main(measures))]
         blocks.append(Section(title="In pairs", anchor="pairs", blocks=pairs))
     causes = Table(
         columns=["", *Cause],
@@ -220,6 +221,11 @@ def _blocks(
     return blocks
 
 
+def _main(measures: list[str]) -> list[str]:
+    """The measures that are drawn, and compared in pairs."""
+    return [name for name in measures if name not in IN_TABLES]
+
+
 def _axis(
     completed: pd.DataFrame, label: str, axes: dict[str, list[str]], measures: list[str], choices: dict[str, Any]
 ) -> Section:
@@ -230,7 +236,7 @@ def _axis(
     columns = _columns(completed, axes, label)
     note = Text(IN_RANGES, style="soft")
     drawing = Drawing(
-        names=(anchor,), draw=lambda: [along_axis(completed, columns, measures, lines)], alt=f"Means by {label}"
+        names=(anchor,), draw=lambda: [along_axis(completed, columns, _main(measures), lines)], alt=f"Means by {label}"
     )
     rows = {
         (choice, line): numbers for choice, each in choices.items() for line, numbers in each.get("split", {}).items()

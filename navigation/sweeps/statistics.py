@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from tussock.world.params import is_generated
 
+from ..experiment_settings import default_settings
 from ..intervals import Interval, mean_interval, positive_interval, share_difference_interval, share_interval
 from ..significance import holm, sign_flip_p
 
@@ -19,8 +20,16 @@ MEASURES = {  # columns of the table of runs, with their labels
     "mean_deviation_m": "mean deviation from the route (m)",
     "mean_error_deg": "mean heading error (°)",
     "resets": "times put back on the route",
+    "looks_per_m": "headings looked at, for each metre",
+    "touches": "steps that obstacles stopped or turned",
+    "inward": "share of looks off the route that lead back to it",
+    "outward": "share of looks off the route that lead away from it",
+    "recovered": "share that came back after being carried aside",
 }
-SHARES = ("arrived",)  # the more the better; of the other measures, the less
+SHARES = ("arrived", "recovered")  # of runs
+BETTER = (*SHARES, "inward")  # the more the better; of the other measures, the less
+OF_STEERING = ("looks_per_m", "inward", "outward")  # shown where not all runs scan
+IN_TABLES = ("touches", "inward", "outward")  # measures that are not drawn, and not compared in pairs
 UNITS = {"m": "m", "deg": "°"}
 AXIS_ORDER = {"model": 0, "world_seed": 2, "route_seed": 2, "seed": 2}  # other axes are 1
 MAX_CHOICES = 200  # of an axis in a report; more are put together
@@ -132,8 +141,15 @@ def choice_label(key: object) -> str:
 
 
 def measures_of(table: pd.DataFrame) -> list[str]:
-    """The measures that a report of runs shows; resets only where there were any."""
-    return [name for name in MEASURES if name != "resets" or table["resets"].to_numpy().any()]
+    """The measures that a report of runs shows.
+
+    Being put back, touches and recovery are shown where there were any; how agents steer, where not all runs scan.
+    """
+    scans = "navigator" not in table or bool((table["navigator"] == default_settings()["navigator"]).all())
+    shown = {name: name in table and bool((table[name].fillna(0) != 0).any()) for name in ("resets", "touches")}
+    shown["recovered"] = "recovered" in table and bool(table["recovered"].notna().any())
+    shown |= {name: name in table and not scans for name in OF_STEERING}
+    return [name for name in MEASURES if shown.get(name, True)]
 
 
 def summary(table: pd.DataFrame, measures: Sequence[str]) -> Summary:
@@ -142,7 +158,7 @@ def summary(table: pd.DataFrame, measures: Sequence[str]) -> Summary:
 
 
 def _summary(table: pd.DataFrame, measures: Sequence[str], worlds: Int[np.ndarray, " n"]) -> Summary:
-    intervals = {measure: _interval(measure, table[measure].to_numpy(dtype=float), worlds) for measure in measures}
+    intervals = {measure: _interval(measure, _numbers(table, measure), worlds) for measure in measures}
     return Summary(runs=len(table), worlds=len(np.unique(worlds)), intervals=intervals)
 
 
@@ -150,6 +166,11 @@ def _interval(measure: str, values: Float[np.ndarray, " n"], worlds: Int[np.ndar
     known = np.isfinite(values)
     find = share_interval if measure in SHARES else positive_interval
     return find(values[known], worlds[known])
+
+
+def _numbers(table: pd.DataFrame, column: str) -> Float[np.ndarray, " n"]:
+    """A column as numbers; nan where a run has none."""
+    return table[column].to_numpy(dtype=float, na_value=np.nan)
 
 
 def by_axis(table: pd.DataFrame, names: list[str], measures: Sequence[str]) -> dict[str, Summary]:
@@ -191,10 +212,10 @@ def pairings(table: pd.DataFrame, settings: Sequence[str], measures: Sequence[st
 
 def _difference(both: pd.DataFrame, measure: str, worlds: Int[np.ndarray, " n"]) -> Difference:
     """The first of two choices less the second, from a table of the pairs."""
-    first, second = (both[name].to_numpy(dtype=float) for name in (measure, f"{measure}_other"))
+    first, second = (_numbers(both, name) for name in (measure, f"{measure}_other"))
     known = np.isfinite(first) & np.isfinite(second)
     first, second, worlds = first[known], second[known], worlds[known]
-    gain = first - second if measure in SHARES else second - first
+    gain = first - second if measure in BETTER else second - first
     better, worse = int((gain > 0).sum()), int((gain < 0).sum())
     return Difference(
         interval=share_difference_interval(first, second, worlds)

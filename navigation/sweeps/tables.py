@@ -91,24 +91,29 @@ def _interval(interval: Mapping[str, float | None], *, bold: bool = False) -> Ce
     return Cell(text=format_value(interval["value"]), note=note, bold=bold)
 
 
-def compared_models(walks: pd.DataFrame) -> dict[str, Any]:
-    """The models of a table of walks in numbers, which has their specs in its column "spec": `models`, each alone, and `pairs` of them."""
+def compared_models(walks: pd.DataFrame, by: str = "model") -> dict[str, Any]:
+    """The models of a table of walks in numbers: `models`, each alone, and `pairs` of them.
+
+    Args:
+        walks: One per row, with the specs of their models in the column "spec".
+        by: "model"; or "navigator", whose names and pairs then take the place of the models': `navigators`.
+    """
     walks = walks.assign(model=walks["spec"])
     measures = measures_of(walks)
-    axis = next((names for names in axes_of(walks, list(TYPES)).values() if "model" in names), ["model"])
+    axis = next((names for names in axes_of(walks, list(TYPES)).values() if by in names), [by])
     found = by_axis(walks, axis, measures)
     return plain_json(
         {
-            "models": {choice: summary_numbers(each) for choice, each in found.items()},
+            f"{by}s": {choice: summary_numbers(each) for choice, each in found.items()},
             "pairs": [pairing_numbers(pair) for pair in pairings(walks, list(TYPES), measures, axis)],
         }
     )
 
 
-def comparison_blocks(compared: Mapping[str, Any]) -> list[Block]:
+def comparison_blocks(compared: Mapping[str, Any], by: str = "model") -> list[Block]:
     """What a page shows of `compared_models`."""
-    models, pairs = compared["models"], compared["pairs"]
+    models, pairs = compared[f"{by}s"], compared["pairs"]
     measures = [name for name in MEASURES if all(name in each for each in models.values())]
     rows = {(name,): each for name, each in models.items()}
-    blocks: list[Block] = [Text(INTERVALS, style="soft"), summary_table(rows, ["model"], measures)]
+    blocks: list[Block] = [Text(INTERVALS, style="soft"), summary_table(rows, [by], measures)]
     return [*blocks, Text(PAIRS, style="soft"), pair_table(pairs, measures)] if pairs else blocks

@@ -2,6 +2,7 @@ from .apiaviz2026 import APIAVIZ2026 as APIAVIZ2026
 from .ardin2016 import ARDIN2016 as ARDIN2016
 from .azevedo2025 import AZEVEDO2025 as AZEVEDO2025
 from .baddeley2012 import BADDELEY2012 as BADDELEY2012
+from .gattaux2025 import GATTAUX2025 as GATTAUX2025
 from .kagioulis2024 import KAGIOULIS2024 as KAGIOULIS2024
 from .knight2019 import KNIGHT2019 as KNIGHT2019
 from .lemoel2020 import LEMOEL2020 as LEMOEL2020
@@ -13,3 +14,5 @@ from .protocol import prepared as prepared
 from .protocol import route_files as route_files
 from .protocol import routes_in as routes_in
 from .registry import PROTOCOLS as PROTOCOLS
+from .stone2017 import STONE2017 as STONE2017
+from .worldless import WorldlessProtocol as WorldlessProtocol

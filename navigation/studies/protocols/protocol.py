@@ -1,6 +1,7 @@
 """What a published experiment is: its runs, its published parameters, and how its numbers follow from the runs."""
 
 import logging
+import math
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from tussock.world.progress import Progress
 from tussock.world.route_files import write_route
 from tussock.world.route_points import TEXT_SUFFIXES
 from tussock.world.scene import World
-from tussock.world.settings import settings, whole
+from tussock.world.settings import settings, switch, whole
 
 from ...content import content_of
 from ...experiment import Experiment
@@ -30,6 +31,7 @@ from ...sweeps.spec import Change, Sweep
 
 log = logging.getLogger(__name__)
 
+HOME = "-home"  # behind the name of a route that is walked from its end to its start
 ROUTE_SUFFIXES = (".bin", ".mat", ".npy", ".npz", *filter(None, TEXT_SUFFIXES))
 
 
@@ -91,6 +93,7 @@ class Protocol:
         columns: Columns of the steps that it needs, where only these are to be kept; see `Sweep.columns`.
         world: World preset where none is given.
         layout: Makes the route that is learned and walked of each route; None takes the route itself.
+        both_ways: Each route is also learned and walked from its end to its start.
         prepare_world: Makes the world that is walked in of one from a file, as colours where the file has none.
         route_names: Names of the route files that are taken of a folder of them, without endings; all where there are none.
         as_published: A variant with the procedure of the original in every detail that is known (`--as-published`).
@@ -115,6 +118,7 @@ class Protocol:
     columns: Sequence[str] | None = None
     world: str = "tussock-field"
     layout: Callable[[Route], Route] | None = None
+    both_ways: bool = switch(False)
     prepare_world: Callable[[World], World] | None = None
     route_names: Sequence[str] = ()
     as_published: "Protocol | None" = None
@@ -188,16 +192,27 @@ def _in_prepared_world(protocol: Protocol, routes: list[Change], folder: Path) -
 
 
 def _laid_out(protocol: Protocol, routes: list[Change], folder: Path) -> list[Change]:
-    if protocol.layout is None:
+    if protocol.layout is None and not protocol.both_ways:
         return routes
     folder.mkdir(parents=True, exist_ok=True)
     changed = []
     for number, each in enumerate(routes, 1):
         _, route = protocol.experiment.replace(**each).open_world_and_route()
         name = Path(each["route"]).stem if "route" in each else f"seed{each['route_seed']}"
-        write_route(protocol.layout(route), path := folder / f"{number:02}-{name}.csv")
-        changed.append({**each, "route": path.resolve()})
+        ways = {name: route if protocol.layout is None else protocol.layout(route)}
+        if protocol.both_ways:
+            ways[name + HOME] = back(ways[name])
+        for label, way in ways.items():
+            write_route(way, path := folder / f"{number:02}-{label}.csv")
+            changed.append({**each, "route": path.resolve()})
     return changed
+
+
+def back(route: Route) -> Route:
+    """The way from a route's end to its start, facing back."""
+    poses = route.poses[::-1].copy()
+    poses[:, 2] += math.pi
+    return Route(poses)
 
 
 def route_names(rows: Collection[dict[str, Any]]) -> list[str]:

@@ -13,7 +13,9 @@ PROTOCOLS = Registry(
         "baddeley2012": f"{_HERE}.baddeley2012:BADDELEY2012",
         "azevedo2025": f"{_HERE}.azevedo2025:AZEVEDO2025",
         "lemoel2020": f"{_HERE}.lemoel2020:LEMOEL2020",
+        "gattaux2025": f"{_HERE}.gattaux2025:GATTAUX2025",
         "kagioulis2024": f"{_HERE}.kagioulis2024:KAGIOULIS2024",
         "apiaviz2026": f"{_HERE}.apiaviz2026:APIAVIZ2026",
+        "beenav2026": f"{_HERE}.beenav2026:BEENAV2026",
     },
 )

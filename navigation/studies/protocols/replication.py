@@ -2,6 +2,7 @@
 
 import re
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,9 @@ from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
 from ...sweeps.tables import compared_models, comparison_blocks
 from .protocol import DatabaseProtocol, Item, Protocol, check_models, route_names
+from .worldless import WorldlessProtocol
+
+AnyProtocol = Protocol | DatabaseProtocol | WorldlessProtocol
 
 SUMMARY = (
     "What the paper claims, the numbers that it gives where it gives any, the numbers obtained here, and whether the claim holds by the "
@@ -72,7 +76,7 @@ def replicate(
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
     outcomes = check_claims(protocol.claims, [results], few_units=False)
-    compared = compared_models(walks)
+    compared = compared_models(walks, _compared(protocol))
     headline = _headline(outcomes, arrivals(walks.assign(model=walks["spec"]), ["model"]))
     report = _report(
         protocol, results, outcomes, compared, about=about, left_out=left_out, command=command, headline=headline
@@ -116,8 +120,46 @@ def measure_images(
     Raises:
         FileError: The images are missing or damaged.
     """
+    return _compute(protocol, lambda: protocol.measure(folder, seed, progress), out, about=about, command=command)
+
+
+def compute(
+    protocol: WorldlessProtocol,
+    out: Path,
+    *,
+    seed: int,
+    quick: bool,
+    about: dict[str, Any],
+    command: str,
+    progress: Progress = no_progress,
+) -> dict[str, Any]:
+    """Do a protocol that needs neither a world nor images, and write the report.
+
+    Args:
+        protocol: The experiment.
+        out: Folder of the report.
+        seed: Of everything random.
+        quick: A first look.
+        about: The choices made, for the head of the report.
+        command: Command line that repeats all of it.
+        progress: Called with how much is done, of how much.
+
+    Returns:
+        The result of `tussock replicate`.
+    """
+    return _compute(protocol, lambda: protocol.measure(seed, quick, progress), out, about=about, command=command)
+
+
+def _compute(
+    protocol: DatabaseProtocol | WorldlessProtocol,
+    measure: Callable[[], StudyResults],
+    out: Path,
+    *,
+    about: dict[str, Any],
+    command: str,
+) -> dict[str, Any]:
     began = time.perf_counter()
-    results = protocol.measure(folder, seed, progress)
+    results = measure()
     outcomes = check_claims(protocol.claims, [results], few_units=False)
     headline = _headline(outcomes)
     report = _report(protocol, results, outcomes, {}, about=about, left_out={}, command=command, headline=headline)
@@ -171,13 +213,18 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
     return table.reset_index(drop=True), {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
 
+def _compared(protocol: Protocol | DatabaseProtocol) -> str:
+    """What a protocol compares: "navigator" where there are several, or else "model"."""
+    return "navigator" if isinstance(protocol, Protocol) and len(protocol.axes.get("navigator", ())) > 1 else "model"
+
+
 def _kind_of(error: str) -> str:
     """An error without what differs between errors of one kind: the text in parentheses."""
     return re.sub(r" \([^()]*\)", "", error).replace(" m is", " is")
 
 
 def _report(
-    protocol: Protocol | DatabaseProtocol,
+    protocol: AnyProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     compared: dict[str, Any],
@@ -197,9 +244,10 @@ def _report(
         columns=["Parameter", "Published", "Here"],
         rows=[(each.name, each.published, each.here) for each in protocol.parameters],
     )
-    walked = isinstance(protocol, Protocol)
-    kept = "Finished runs are in the folder and are not done again. " if walked else ""
-    again = Text(kept + "The same command gives the same numbers.")
+    walked, by = isinstance(protocol, Protocol), _compared(protocol)
+    blocks = comparison_blocks(compared, by) if compared else []
+    beside = [Section(title=f"{by.capitalize()}s compared", anchor=f"{by}s", blocks=blocks)] if compared else []
+    again = "Finished runs are in the folder and are not done again. " if walked else ""
     return Report(
         title=protocol.title,
         lead=protocol.question,
@@ -207,17 +255,17 @@ def _report(
         blocks=[
             Section(title="Does it hold?", anchor="summary", blocks=summary),
             Section(title="Results", anchor="results", blocks=shown),
-            *(
-                [Section(title="Models compared", anchor="models", blocks=comparison_blocks(compared))]
-                if compared
-                else []
-            ),
+            *beside,
             Section(
                 title="Differences from the original",
                 anchor="differences",
                 blocks=[parameters, Bullets(protocol.differences)],
             ),
-            Section(title="To do it again", anchor="again", blocks=[again, Command(command)]),
+            Section(
+                title="To do it again",
+                anchor="again",
+                blocks=[Text(again + "The same command gives the same numbers."), Command(command)],
+            ),
         ],
         footer=f"After {protocol.paper} All numbers are in results.json"
         + (", every walk is in runs.parquet." if walked else "."),
@@ -227,15 +275,14 @@ def _report(
 
 
 def _section(item: Item, table: pd.DataFrame) -> Section:
-    draw = item.draw
-    if draw is None:
+    if (draw := item.draw) is None:
         return Section(title=item.title, anchor=item.name, blocks=[Table.of(table, item.caption)])
     drawing = Drawing(names=(item.name,), draw=lambda: [draw(table)], alt=item.title, caption=item.caption)
     return Section(title=item.title, anchor=item.name, blocks=[drawing])
 
 
 def _results(
-    protocol: Protocol | DatabaseProtocol,
+    protocol: AnyProtocol,
     results: StudyResults,
     outcomes: list[Outcome],
     *,

@@ -1,0 +1,68 @@
+"""Marks in the world where something happens to an agent, and the events of a step as text."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import rerun as rr
+
+from tussock.world.geometry import Pose
+
+from ..failures import Cause, Diagnosis
+from ..walker import Step
+from .blueprint import CARRIED, TOUCHED, cause_entity
+from .signals import Send
+
+MARKS_ABOVE = 0.04  # m; marks are drawn this high above the ground, and above all lines
+LABEL_SPACING = 0.6  # m; marks of one cause nearer than this to the one with its name have none
+
+
+def mark_place(step: Step, above: float = MARKS_ABOVE) -> tuple[float, float, float]:
+    """Where a mark of a step is drawn."""
+    return *step.pose[:2], step.height + above
+
+
+class Marks:
+    """Marks of the steps of a recording, whose `send` it is given."""
+
+    def __init__(self, send: Send):
+        self._send = send
+        self._labelled: tuple[Cause, Pose] | None = None  # the cause that was last written at its mark, and where
+
+    def write(self, steps: list[tuple[Step, Diagnosis | None]]) -> None:
+        """Mark where some steps are poor or failed, where obstacles stopped or turned them, and where the agent was carried."""
+        self._causes([(step, diagnosis) for step, diagnosis in steps if diagnosis is not None])
+        for at, marked in (
+            (TOUCHED, [step for step, _ in steps if step.touched]),
+            (CARRIED, [step for step, _ in steps if step.displaced]),
+        ):
+            self._send(at, marked, rr.Points3D.columns(positions=[mark_place(step) for step in marked]))
+
+    def _causes(self, poor: list[tuple[Step, Diagnosis]]) -> None:
+        """A mark where a step is poor or failed, in the colour of its cause; the first of several close marks has its name."""
+        marks: dict[Cause, list[tuple[Step, str]]] = {}
+        for step, diagnosis in poor:
+            cause = diagnosis.cause
+            last, where = self._labelled or (None, step.pose)
+            close = last == cause and np.hypot(step.pose.x - where.x, step.pose.y - where.y) < LABEL_SPACING
+            marks.setdefault(cause, []).append((step, "" if close else cause.value))
+            self._labelled = self._labelled if close else (cause, step.pose)
+        for cause, marked in marks.items():
+            steps, labels = [step for step, _ in marked], [label for _, label in marked]
+            positions = [mark_place(step) for step in steps]
+            shown = [label != "" for label in labels]
+            columns = rr.Points3D.columns(positions=positions, labels=labels, show_labels=shown)
+            self._send(cause_entity(cause), steps, columns)
+
+
+def events_of(step: Step, diagnosis: Diagnosis | None, *, touching: bool) -> Iterator[str]:
+    """What happened at a step, where anything did. touching: Whether an obstacle stopped or turned the step before it, too."""
+    if step.reset:
+        yield f"{step.reset}: put back on the route"
+    if step.displaced:
+        yield "carried to the side of the route"
+    if step.touched and not touching:
+        yield "an obstacle stops or turns it"
+    if ended := step.reason or step.failure:
+        yield ended
+    if diagnosis is not None:
+        yield str(diagnosis)
