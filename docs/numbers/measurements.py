@@ -8,6 +8,7 @@ import eyes
 import pictures
 import processors
 import protocols
+import steering
 from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
@@ -62,6 +63,7 @@ MEASUREMENTS = (
     | pictures.MEASUREMENTS
     | processors.MEASUREMENTS
     | protocols.MEASUREMENTS
+    | steering.MEASUREMENTS
     | {
         "learning-walks": Measurement(
             "a sweep of `learning-walk-m`, `offset-m`, `heading-noise-deg` and `seed`",

@@ -1,6 +1,5 @@
 """Doing a protocol: its runs are a sweep in the folder of its report."""
 
-import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -8,10 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress
 
-from ...experiment_keys import key_of
 from ...reports.claims import Outcome, check_claims, count_outcomes
 from ...reports.report import (
     REPORT,
@@ -30,10 +27,10 @@ from ...reports.report import (
 from ...reports.results import StudyResults
 from ...sweeps.report import arrivals
 from ...sweeps.spec import Sweep
-from ...sweeps.store import Store, read_steps, table_of
 from ...sweeps.sweep import run_sweep
 from ...sweeps.tables import compared_models, comparison_blocks
-from .protocol import DatabaseProtocol, Item, Protocol, check_models, route_names
+from .finished_walks import walks_of
+from .protocol import DatabaseProtocol, Item, Protocol
 from .worldless import WorldlessProtocol
 
 AnyProtocol = Protocol | DatabaseProtocol | WorldlessProtocol
@@ -178,49 +175,9 @@ def _headline(outcomes: list[Outcome], *others: str) -> str:
     return "; ".join(parts) + "." if parts else ""
 
 
-def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame, dict[str, int]]:
-    """Read the walks of a protocol from its folder.
-
-    Args:
-        protocol: The experiment.
-        sweep: Its runs.
-        out: The folder.
-
-    Returns:
-        One row per walk, ordered by model, with the columns of the protocol's `of_walk` and the model with its parameters as "spec"; and
-        the number of runs that could not be made, by the reason.
-
-    Raises:
-        SettingError: There is no walk at all, or none with one of the models.
-    """
-    keys = {key_of(run) for run in sweep.experiments}
-    with Store(out, read_only=True) as store:
-        rows = {key: row for key, row in store.rows().items() if key in keys}
-        for (key, row), name in zip(rows.items(), route_names(rows.values()), strict=True):
-            row["place"] = name
-            if row["error"] is None:
-                row |= protocol.of_walk(row, read_steps(store.steps(key)))
-    reasons = [_kind_of(row["error"]) for row in rows.values() if row["error"] is not None]
-    if len(reasons) == len(rows):
-        raise SettingError(f"none of {len(rows)} runs could be made; the first: {reasons[0]}")
-    table = table_of({key: row for key, row in rows.items() if row["error"] is None})
-    models = list(dict.fromkeys(str(run.model) for run in sweep.experiments))
-    check_models(table, models)
-    order = table["model"].map({model: k for k, model in enumerate(models)})
-    table = table.iloc[order.argsort(kind="stable")].assign(
-        spec=lambda each: each["model"], model=lambda each: each["model"].str.split().str[0]
-    )
-    return table.reset_index(drop=True), {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
-
-
 def _compared(protocol: Protocol | DatabaseProtocol) -> str:
     """What a protocol compares: "navigator" where there are several, or else "model"."""
     return "navigator" if isinstance(protocol, Protocol) and len(protocol.axes.get("navigator", ())) > 1 else "model"
-
-
-def _kind_of(error: str) -> str:
-    """An error without what differs between errors of one kind: the text in parentheses."""
-    return re.sub(r" \([^()]*\)", "", error).replace(" m is", " is")
 
 
 def _report(
@@ -248,6 +205,7 @@ def _report(
     blocks = comparison_blocks(compared, by) if compared else []
     beside = [Section(title=f"{by.capitalize()}s compared", anchor=f"{by}s", blocks=blocks)] if compared else []
     again = "Finished runs are in the folder and are not done again. " if walked else ""
+    again += "The same command gives the same numbers."
     return Report(
         title=protocol.title,
         lead=protocol.question,
@@ -264,7 +222,7 @@ def _report(
             Section(
                 title="To do it again",
                 anchor="again",
-                blocks=[Text(again + "The same command gives the same numbers."), Command(command)],
+                blocks=[Text(again), Command(command)],
             ),
         ],
         footer=f"After {protocol.paper} All numbers are in results.json"
