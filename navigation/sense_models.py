@@ -16,7 +16,8 @@ from tussock.world.specs import Spec
 class Senses:
     """How well an agent measures its heading and the distance that it walks.
 
-    Errors grow with the square root of distance and time, so that they do not depend on the length of a step.
+    Errors of the odometer and drift grow with the square root of distance and time, whatever the length of a step. Those of the compass
+    are new at each reading, so that more and shorter steps average more of them.
 
     Attributes:
         odometry: Standard deviation of the measured distance (m) after 1 m.

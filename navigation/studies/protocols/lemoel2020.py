@@ -200,7 +200,8 @@ DIFFERENCES = (
     "plants were chosen in the worlds of seeds 100 to 104, by how near the nest agents stay at the published baseline and gain.",
     "Learning walks are all that is learned here; the original also walks a route of 10 m to the nest.",
     "In the grid all views face the nest. A walk that leaves the world counts as where it left it.",
-    "For one memory alone we take a baseline of 0 (attractive) or 180 degrees (repulsive), with the same gain.",
+    "For one memory alone we take a baseline of 0 (attractive) or 180 degrees (repulsive), with the same gain. Then an agent walks "
+    "straight on in a familiar direction; where the attractive memory knows nothing it turns about at each step, and stays where it is.",
     "All walks of a world draw the same noise on their turns.",
 )
 
@@ -220,8 +221,8 @@ ITEMS = (
         "release",
         "Release test",
         "curves",
-        f"Mean distance from the nest over the steps of agents that were released {RING:g} m from it; lines of dashes: views that were "
-        "learned with the gaze within 135 degrees of the nest.",
+        f"Mean distance from the nest over the steps of agents that were released {RING:g} m from it. Dashed: they learned views within "
+        "135 degrees of the nest.",
         lambda table: distances_over_steps(table, "memories", "spread"),
     ),
     Item("release-table", "Release test in numbers", "release", "Gaze: within how many degrees of the nest."),
