@@ -54,6 +54,16 @@ def steering() -> list[Change]:
     ]
 
 
+def flights(count: int) -> list[Change]:
+    """Each steering from each start. Path integration has other noise at each start; a network learns once for all."""
+    first = [tuple(start.values()) for start in starts(DISTANCES, STARTS)]
+    return [
+        steer | start | ({"seed": first.index(tuple(start.values()))} if steer["navigator"] == VECTOR else {})
+        for steer in map(dict, steering())
+        for start in map(dict, starts(DISTANCES, count))
+    ]
+
+
 def measure(walks: pd.DataFrame) -> StudyResults:
     """Share of walks that come home, by what steers, the senses and the distance of the start."""
     navigators = walks["navigator"].str.split().str[0]
@@ -148,6 +158,7 @@ DIFFERENCES = (
     "Agents start facing home, the original's anywhere. What steers here turns to any direction at its first look.",
     "Noise of the senses is on the places that are learned along the flight, and on path integration, out and back. Path "
     "integration alone flies straight out, and at the end of its vector searches in loops.",
+    "One draw of noise for the learning flight with each kind of senses, the same in all worlds; path integration has one for each start.",
     "The snapshot model of the original is not here; the average landmark vector stands for models of one view.",
 )
 
@@ -204,10 +215,10 @@ BEENAV2026 = Protocol(
         stopping=StoppingRules(arrival_radius=1.2, max_deviation=1000.0, patience=1000.0, max_steps=50),
         body=Body(step_length=STEP),
     ),
-    axes={"steering": steering(), "start": starts(DISTANCES, STARTS), "model": ["perfect-memory"]},
+    axes={"flight": flights(STARTS), "model": ["perfect-memory"]},
     worlds=10,
     quick_worlds=2,
-    quick_axes={"start": starts(DISTANCES, 4)},
+    quick_axes={"flight": flights(4)},
     parameters=PARAMETERS,
     differences=DIFFERENCES,
     measure=measure,
