@@ -45,7 +45,7 @@ bench-jobs: $(VENV)/developer  ## whole jobs, next to those of another checkout:
 numbers: $(VENV)/developer  ## the numbers that README and docs print, measured again and written into the pages: the quick ones
 	$(BIN)/python docs/numbers/make.py
 
-numbers-slow: $(VENV)/developer  ## the others; they take half an hour
+numbers-slow: $(VENV)/developer  ## the others; they take over an hour
 	$(BIN)/python docs/numbers/make.py --slow
 
 $(VENV)/installed: pyproject.toml constraints.txt

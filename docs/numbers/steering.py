@@ -105,12 +105,12 @@ def lines_of(steps: Sequence[Step]) -> dict[str, np.ndarray]:
 
 
 def measure_looks(folder: Path) -> Values:
-    """Walks in the worlds of the test bed by navigators and models: arrivals, and looks a metre."""
+    """Walks in the first two worlds of each preset in the test bed by navigators and models: arrivals, and looks a metre."""
     base = {"size": "360x75", "spacing-m": 0.4, "route-length-m": 8.0, "heading-noise-deg": NOISE, "threads": 1}
     axes = {
         "navigator": list(STEERING),
         "model": list(MODELS),
-        "place": [{"world": world, "seed": seed} for world, seed in BENCHMARK.worlds],
+        "place": [{"world": world, "seed": seed} for world, seed in BENCHMARK.worlds if seed % 100 < 2],
         "offset-m": list(BENCHMARK.displacements),
     }
     table = sweep(folder, "looks", base, axes)
