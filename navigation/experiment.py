@@ -25,7 +25,7 @@ from tussock.world.specs import Spec, takes
 from .body import Body
 from .devices import check_device, chosen_device
 from .displacement import Displacement
-from .experiment_fields import as_encoding, as_model, as_navigator, check_matches
+from .experiment_fields import as_encoding, as_model, as_navigator, check_matches, check_start
 from .sense_models import as_senses
 from .stopping import StoppingRules
 from .surroundings import Surroundings
@@ -91,6 +91,7 @@ class Experiment(Surroundings):
             raise SettingError(
                 "--spacing-m, --parallel-views and --goal-walk-m are of worlds; an image database has its views: give --every instead"
             )
+        check_start(self)
         if isinstance(self.model, Spec):
             model = self.make_model()  # refuses bad parameters
             if not isinstance(model, FamiliarityModel):

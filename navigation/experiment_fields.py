@@ -61,3 +61,16 @@ def check_matches(experiment: Any, trained: "TrainedModel") -> None:
             f"{experiment.model} learned views encoded as {str(trained.encoding)!r}, this experiment has {str(experiment.encoding)!r}; use "
             "the same"
         )
+
+
+def check_start(experiment: Any) -> None:
+    """Refuse flags of which one makes the other useless. Raises SettingError."""
+    lost, carried = experiment.stopping.max_deviation, experiment.displacement.left
+    if experiment.release and experiment.start_offset:
+        raise SettingError("--offset-m is from the start of the route, --release-m from its end: give one of the two")
+    if abs(carried) > lost and not experiment.stopping.put_back:
+        raise SettingError(
+            f"--displace-m {carried:g} is farther than --lost-m {lost:g}, where every walk ends: give a larger --lost-m"
+        )
+    if experiment.route_database is not None and experiment.body.collisions != "pass":
+        raise SettingError(f"--collisions {experiment.body.collisions}: images have no obstacles; leave it out")

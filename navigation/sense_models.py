@@ -7,6 +7,7 @@ from functools import partial
 from math import radians
 from typing import Any
 
+from tussock.world.errors import SettingError
 from tussock.world.registry import Registry
 from tussock.world.settings import number, settings
 from tussock.world.specs import Spec
@@ -17,7 +18,7 @@ class Senses:
     """How well an agent measures its heading and the distance that it walks.
 
     Errors of the odometer and drift grow with the square root of distance and time, whatever the length of a step. Those of the compass
-    are new at each reading, so that more and shorter steps average more of them.
+    are new at each reading, so that more and shorter steps average more of them; an agent that has not moved reads it exactly.
 
     Attributes:
         odometry: Standard deviation of the measured distance (m) after 1 m.
@@ -30,6 +31,11 @@ class Senses:
     compass: float = number(0.0, low=0, unit="rad")
     compass_drift: float = number(0.0, low=0, unit="rad")
     speed: float = number(0.1, above=0, unit="m/s")
+
+    @property
+    def noisy(self) -> bool:
+        """Whether they are not exact."""
+        return max(self.odometry, self.compass, self.compass_drift) > 0
 
 
 # Noise of the odometer (per root metre) and of the heading (degrees per root second), as Bee-Nav (2026) compares them. Ants and bees have a
@@ -57,5 +63,6 @@ SENSES = Registry(
 def as_senses(value: Any) -> Spec:
     """The spec of senses from a text, a spec or `Senses`. Raises SettingError."""
     spec = SENSES.spec(value) if isinstance(value, str) else value if isinstance(value, Spec) else SENSES.spec_of(value)
-    spec.make()  # refuses bad parameters
+    if not isinstance(spec.make(), Senses):  # refuses bad parameters, too
+        raise SettingError(f"{str(spec)!r} is not a model of senses; name one, such as 'ant'")
     return spec

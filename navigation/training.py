@@ -83,9 +83,15 @@ def _inside(poses: Float[np.ndarray, "n 3"], field: Bounds | None) -> Float[np.n
 
 def poses_of_setup(setup: TrainingSetup, route: Route, field: Bounds | None = None) -> Float[np.ndarray, "n 3"]:
     """`training_poses` as a setup says, after those of a learning walk about the goal."""
-    about_goal = goal_walk_poses(setup, route)
+    planned = goal_walk_poses(setup, route)
+    about_goal = _inside(planned, field)
+    if len(about_goal) < len(planned):
+        out = len(planned) - len(about_goal)
+        log.warning(
+            "%d of %d views of the walk about the goal are outside of the world, and not learned", out, len(planned)
+        )
     if setup.goal_only:
-        return _inside(about_goal, field)
+        return about_goal
     along = training_poses(
         route,
         setup.spacing,
@@ -94,7 +100,7 @@ def poses_of_setup(setup: TrainingSetup, route: Route, field: Bounds | None = No
         parallel=setup.parallel_views,
         field=field,
     )
-    return np.concatenate([_inside(about_goal, field), along])
+    return np.concatenate([about_goal, along])
 
 
 def goal_walk_poses(setup: TrainingSetup, route: Route) -> Float[np.ndarray, "n 3"]:

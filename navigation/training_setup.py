@@ -23,7 +23,7 @@ class TrainingSetup:
             is learned before the route. 0: none.
         goal_turns: Number of turns of the spiral.
         goal_views: Number of its views.
-        goal_spread: They face up to this much to either side of the end, at random (rad).
+        goal_spread: They face up to this much to either side of the end, at random (rad), the same for every seed.
         goal_only: Learn only its views, and none along the route.
     """
 

@@ -104,11 +104,17 @@ class Trajectory:
         if not self.rows:
             return dict.fromkeys(("looks_per_m", "touches", "inward", "outward", "goal_m", "recovered"))
         walked = np.hypot(*np.diff(self.xy, axis=0).T)
-        carried = [value != "" for value in self.column("displaced")]
-        metres = float(walked[[not each for each in carried[1:]]].sum())
+        carried, put_back = ([value != "" for value in self.column(name)] for name in ("displaced", "reset"))
+        metres = float(
+            walked[~np.array([a or b for a, b in zip(carried, put_back, strict=True)][1:], dtype=bool)].sum()
+        )
         deviation, error = np.array(self.column("deviation_m")), np.radians(self.column("error_deg"))
         inward, outward = off_route(deviation, np.array(self.column("side")), error)
-        back = deviation[carried.index(True) :] <= RECOVERED if any(carried) else None
+        back = None
+        if any(carried):
+            since = carried.index(True)
+            until = put_back.index(True, since + 1) if any(put_back[since + 1 :]) else len(self)
+            back = deviation[since:until] <= RECOVERED
         return {
             "looks_per_m": sum(self.column("looks")) / metres if metres else None,
             "touches": sum(value != "" for value in self.column("touched")),

@@ -113,7 +113,7 @@ class Walker:
         self.stop_check = StopCheck(stopping, walk.route, walk.world.field, body.step_length)
         self.index, self.ended = 0, False
         self.displacement = displacement if displacement.left else None  # while it is to come
-        self.readings = Readings(senses, random)
+        self.readings = Readings(senses, random.spawn(1)[0] if senses.noisy else random)
         self.walked, self.touched, self.displaced = 0.0, False, False  # since the look before
         self.reset: StopReason | None = None
         self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
@@ -144,8 +144,12 @@ class Walker:
         if due is None or self.reason is not None or self.along < due.at * self.walk.route.length:
             return False
         x, y = Pose(*self.pose[:2], self.route_heading).moved(0.0, due.left)[:2]
+        self.displacement, world = None, self.walk.world
+        if world.terrain is not None and not world.stands(np.array([[x, y]]))[0]:
+            self.reason = StopReason.OFF_GROUND  # nothing can stand there, so it stays where it is
+            return False
         self.pose = Pose(x, y, self.pose.heading).rounded()
-        self.displacement, self.displaced, self.trodden = None, True, None
+        self.displaced, self.trodden = True, None
         return True
 
     def block(self, x: float, y: float) -> None:
@@ -163,6 +167,7 @@ class Walker:
             self.stopped = self._obstacle(terrain, before, height - height_before)
             if self.stopped is not None:
                 self.pose, height = Pose(before.x, before.y, self.pose.heading), height_before
+                self.walked = 0.0
         self.height = height
 
     def _obstacle(self, terrain: Terrain, before: Pose, rise: float) -> StopReason | None:
@@ -239,9 +244,10 @@ def check_inside(pose: Pose, world: World) -> None:
     """Refuse a start that is outside of the world, or off its ground. Raises SettingError."""
     if not np.isfinite(pose).all() or not world.field.contains(pose.x, pose.y):
         raise SettingError(
-            f"the start {place_text(pose.x, pose.y)} is outside the world ({world.field}); choose another route or offset"
+            f"the start {place_text(pose.x, pose.y)} is outside the world ({world.field}); choose another route, "
+            "--offset-m or --release-m"
         )
     if world.terrain is not None and not world.stands(np.array([pose[:2]]))[0]:
         raise SettingError(
-            f"a walk cannot start there: {world.terrain.problem(pose.x, pose.y)}; choose another route or offset"
+            f"a walk cannot start there: {world.terrain.problem(pose.x, pose.y)}; choose another route, --offset-m or --release-m"
         )

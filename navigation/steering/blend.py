@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from jaxtyping import Float
 
-from tussock.world.settings import converted, number, settings
+from tussock.world.settings import converted, number, settings, whole
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
@@ -30,16 +30,18 @@ class Blend:
         one: A navigator's spec.
         other: Another's.
         weight: Of the other, 0 to 1.
+        seed: For the one of them that draws random numbers.
     """
 
     model: FamiliarityModel = attrs.field()
     one: Spec = converted(default="lateral", converter=navigator_spec)
     other: Spec = converted(default="path-integration", converter=navigator_spec)
     weight: float = number(0.5, low=0, high=1)
+    seed: int = whole(0, low=0)
     navigators: tuple[Navigator, Navigator] = attrs.field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        both = tuple(made(spec, copy.deepcopy(self.model)) for spec in (self.one, self.other))
+        both = tuple(made(spec, copy.deepcopy(self.model), self.seed) for spec in (self.one, self.other))
         object.__setattr__(self, "navigators", both)
 
     @property
@@ -78,6 +80,10 @@ class Blend:
         weights = [
             share * (ones if motion.certainty is None else motion.certainty)
             for share, motion in zip((1 - self.weight, self.weight), motions, strict=True)
+        ]
+        unsure = weights[0] + weights[1] <= 0  # then the shares alone decide
+        weights = [
+            np.where(unsure, share, each) for share, each in zip((1 - self.weight, self.weight), weights, strict=True)
         ]
         total = np.maximum(weights[0] + weights[1], np.finfo(float).tiny)
         vector = sum(weight * np.exp(1j * motion.turn) for weight, motion in zip(weights, motions, strict=True)) / total

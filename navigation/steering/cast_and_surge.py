@@ -159,4 +159,4 @@ class Casting:
         """Begin again where it was put back, after this share (0 to 1) of the learned sequence, the way ahead."""
         if hasattr(self.following, "resume"):
             self.following.resume(progress)  # type: ignore[union-attr]
-        self.way, self.casting, self.usual = None, False, None
+        self.way, self.casting, self.usual, self.walked = None, False, None, 0.0

@@ -106,7 +106,7 @@ class CentralComplexSteering:
         activity = self._walked(memories, look.compass, distance_walked(look, "central-complex"), noise)
         for row, memory in enumerate(memories):
             memory.activity = activity[row : row + 1]
-        signals, looks = self._signals(activity), None
+        signals, looks = self._signals(activity), np.zeros(len(look), dtype=np.int64)
         if self.vision > 0:
             signals["visual_vector"] = vector = self._visual_vector(look)
             looks = np.full(len(look), look.views.shape[2])

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tussock.world.errors import SettingError
-from tussock.world.specs import Spec
+from tussock.world.specs import Spec, takes
 
 from ..models.base import FamiliarityModel
 from .navigator import Images, Journey, LearningPlaces, Navigator, PathIntegrating
@@ -25,9 +25,11 @@ def navigator_spec(value: Any) -> Spec:
     return NAVIGATORS.spec(",".join(map(str, parts)))
 
 
-def made(spec: Spec, model: Any) -> Navigator:
-    """The navigator of a spec. Raises SettingError for what is none."""
-    navigator = spec.make(model=model)
+def made(spec: Spec, model: Any, seed: int) -> Navigator:
+    """The navigator of a spec. Raises SettingError for what is none, and for one without a model where the eye does not see everything."""
+    if getattr(model, "mask", None) is not None and not takes(spec.target, "model"):
+        raise SettingError(f"the navigator {str(spec)!r} takes no model; give no field and no mask")
+    navigator = spec.make(model=model, seed=seed)
     if not isinstance(navigator, Navigator):
         raise SettingError(f"{str(spec)!r} is not a navigator; name one, such as 'scan'")
     return navigator
@@ -41,11 +43,7 @@ def take_trained(navigators: Sequence[Navigator]) -> bool:
 def learn_views(navigators: Sequence[Navigator], views: Images, places: Float[ndarray, "n 3"] | None) -> None:
     """Let navigators learn the views of a route; `places` for those that learn them, too."""
     for navigator in navigators:
-        if isinstance(navigator, LearningPlaces):
-            if places is None:
-                raise SettingError(
-                    f"{type(navigator).__name__} learns where views were seen, which is not known here; name another"
-                )
+        if places is not None and isinstance(navigator, LearningPlaces):
             navigator.learn_at(views.clone(), places)
         else:
             navigator.learn(views.clone())

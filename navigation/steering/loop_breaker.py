@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import wrap_angle
-from tussock.world.settings import choice, converted, number, settings
+from tussock.world.settings import choice, converted, number, settings, whole
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
@@ -35,6 +35,7 @@ class LoopBreaker:
         escape: Length of the way out (m).
         aside: How much the way out turns from the direction of the way before (rad).
         first: The side of the first way out.
+        seed: For a navigator that draws random numbers.
     """
 
     model: FamiliarityModel = attrs.field()
@@ -44,10 +45,11 @@ class LoopBreaker:
     escape: float = number(0.2, above=0, unit="m")
     aside: float = number(np.pi / 6, low=0, high=np.pi, unit="rad")
     first: str = choice("left", ("left", "right"))
+    seed: int = whole(0, low=0)
     steers: Navigator = attrs.field(init=False)
 
     def __attrs_post_init__(self) -> None:
-        object.__setattr__(self, "steers", made(self.navigator, self.model))
+        object.__setattr__(self, "steers", made(self.navigator, self.model, self.seed))
 
     @property
     def models(self) -> tuple[FamiliarityModel, ...]:
@@ -123,6 +125,13 @@ class LoopMemory(Remembered):
     way_in: complex = 0j
     direction: float = 0.0
     left: float = 0.0
+
+    def resume(self, progress: float) -> None:
+        """Go on where it was put back, after this share (0 to 1) of the route, out of any loop."""
+        super().resume(progress)
+        self.steps.clear()
+        self.lengths.clear()
+        self.way_in, self.left = 0j, 0.0
 
     @property
     def length(self) -> float:

@@ -172,18 +172,25 @@ class LearningPlaces(Navigator, Protocol):
 def check_motion(motion: Motion, n: int, navigator: Navigator) -> None:
     """Refuse a motion that n agents cannot make. Raises SettingError."""
     step = np.ones(n) if motion.step is None else np.asarray(motion.step)
-    if short := [name for name, values in motion.signals.items() if len(values) != n]:
+    if short := [name for name, values in motion.signals.items() if not _numbers_of_each(values, n)]:
         raise SettingError(
-            f"{type(navigator).__name__} gave the signal {short[0]!r} for {len(motion.signals[short[0]])} of {n} agents"
+            f"{type(navigator).__name__} gave {short[0]!r} as a signal; it must be numbers, a row for each of {n} agents"
         )
+    others = [each for each in (motion.looks, motion.certainty) if each is not None]
     valid = (
         np.shape(motion.turn) == step.shape == (n,)
         and np.isfinite(motion.turn).all()
         and (step >= 0).all()
         and (step <= 1).all()
+        and all(np.shape(each) == (n,) and np.min(each, initial=0) >= 0 for each in others)
     )
     if not valid:
         raise SettingError(
             f"{type(navigator).__name__} decided to turn by {motion.turn} and to step by {motion.step}; it must return {n} finite turns "
-            "(rad) and, if any, as many shares of a step, from 0 to 1"
+            "(rad) and, if any, as many shares of a step, from 0 to 1, looks and certainties"
         )
+
+
+def _numbers_of_each(values: Any, n: int) -> bool:
+    """Whether a signal is numbers, a row for each of n agents."""
+    return np.shape(values)[:1] == (n,) and np.asarray(values).dtype.kind in "fiub"

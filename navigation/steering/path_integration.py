@@ -108,7 +108,9 @@ class PathIntegration:
             if memory.side is None:
                 memory.side = 1 if first > -1e-9 else -1
         length = np.hypot(*homes.T)
-        return Motion(turn=turn, certainty=length / (length + self.reach), signals={"home_vector": homes})
+        looks = np.zeros(len(look), dtype=np.int64)
+        certainty = length / (length + self.reach)
+        return Motion(turn=turn, certainty=certainty, looks=looks, signals={"home_vector": homes})
 
 
 def distance_walked(look: Look, navigator: str) -> Float[np.ndarray, " n"]:

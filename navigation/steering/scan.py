@@ -55,7 +55,8 @@ class Scan:
             return self._scanned(look, memories)
         due = np.flatnonzero([memory.next_look() % self.every == 0 for memory in memories]).tolist()
         if len(due) == 0:
-            return Motion(turn=np.zeros(len(look)), looks=np.zeros(len(look), dtype=np.int64))
+            nothing = np.zeros(len(look))
+            return Motion(turn=nothing, certainty=nothing, looks=nothing.astype(np.int64))
         some = Look(views=look.views[due], compass=look.compass[due])
         return self._scanned(some, [memories[row].following for row in due]).spread(due, len(look))
 
