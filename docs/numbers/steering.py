@@ -115,8 +115,9 @@ def measure_looks(folder: Path) -> Values:
     }
     table = sweep(folder, "looks", base, axes)
     groups = table.groupby(["navigator", "model"], sort=False)
+    written = {str(NAVIGATORS.spec(name)): name for name in STEERING}  # as above, with angles in degrees
     rows = {
-        f"{navigator} | {model}": {
+        f"{written[navigator]} | {model}": {
             "arrived": [int(group["arrived"].sum()), len(group)],
             "looks_per_m": round(float(group["looks_per_m"].median()), 1),
         }
@@ -138,16 +139,17 @@ def draw_looks(path: Path, rows: Values) -> None:
             axes.plot(row["looks_per_m"], arrived / walks, "o", color=colours[model], ms=6)
             if model == MODELS[0]:
                 axes.annotate(
-                    navigator,
+                    navigator.partition(" one=")[0].partition(" width")[0],
                     (row["looks_per_m"], arrived / walks),
-                    xytext=(5, 4),
+                    xytext=(5, 4 if navigator != "oscillator" else -11),
                     textcoords="offset points",
                     fontsize=8,
                 )
         for model, colour in colours.items():
             axes.plot([], [], "o", color=colour, label=model)
         axes.set(xscale="log", xlabel="looks a metre", ylabel="share of walks that arrived", ylim=(-0.03, 1.08))
-        axes.legend(loc="lower right")
+        axes.legend(loc="upper left")
+        axes.set_xlim(12, 6000)
         save_picture(figure, path)
 
 

@@ -265,9 +265,9 @@ class RunOptions(ModelOptions):
     max_steps: int | None = None
     """Limit of steps. Default: as many as three times the route's length needs."""
     navigator: str = default(Experiment, "navigator")
-    """What steers, with parameters after its name, as in 'lateral gain=4': scan (to the most familiar heading), stepped-scan, lateral, opponent,
-    oscillator, familiarity-modulated, cast-and-surge, homing, average-landmark-vector, image-gradient, home-vector, path-integration,
-    central-complex, blend or loop-breaker (docs/steering.md). One of your own is package.module:Class."""
+    """What steers, with parameters after its name, as in 'lateral gain=4': scan (to the most familiar heading), stepped-scan, lateral,
+    opponent, oscillator, familiarity-modulated, cast-and-surge, homing, average-landmark-vector, image-gradient, home-vector,
+    path-integration, central-complex, blend or loop-breaker (docs/steering.md). One of your own is package.module:Class."""
 
 
 def import_used(names: str) -> None:
