@@ -107,7 +107,7 @@ class Trajectory:
         carried = [value != "" for value in self.column("displaced")]
         metres = float(walked[[not each for each in carried[1:]]].sum())
         deviation, error = np.array(self.column("deviation_m")), np.radians(self.column("error_deg"))
-        inward, outward = off_route(deviation, np.array(self.column("side"), dtype=float), error)
+        inward, outward = off_route(deviation, np.array(self.column("side")), error)
         back = deviation[carried.index(True) :] <= RECOVERED if any(carried) else None
         return {
             "looks_per_m": sum(self.column("looks")) / metres if metres else None,

@@ -11,7 +11,7 @@ from ...body import Body
 from ...experiment import Experiment
 from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
-from ...senses import SENSES
+from ...sense_models import SENSES
 from ...stopping import StoppingRules
 from ...sweeps.spec import Change
 from ...training_setup import TrainingSetup
