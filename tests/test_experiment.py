@@ -114,7 +114,20 @@ CHAIN = st.sampled_from(
     ["grey | blur 2.5 | resize 3", "sky-mask", "foreground-mask | widen 3 | normalise", "grey | resize 1"]
 )
 ENCODINGS = PRESET | CHAIN.map(lambda chain: {"encoding": chain}) | st.just({})
-SETTINGS = st.tuples(st.fixed_dictionaries({}, optional=VALUES), ENCODINGS).map(lambda parts: parts[0] | parts[1])
+
+
+def agreeing(settings: dict) -> dict:
+    """Settings without those that contradict others."""
+    if settings.get("release_m"):
+        settings.pop("offset_m", None)
+    if abs(settings.get("displace_m", 0.0)) > settings.get("lost_m", 0.5):
+        settings.pop("displace_m")
+    return settings
+
+
+SETTINGS = st.tuples(st.fixed_dictionaries({}, optional=VALUES), ENCODINGS).map(
+    lambda parts: agreeing(parts[0] | parts[1])
+)
 OF_DATABASES = (
     "every",
     "learning_walk_m",

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tussock.navigation.cli.main import main
-from tussock.navigation.senses import Senses, as_senses
+from tussock.navigation.sense_models import as_senses
+from tussock.navigation.senses import Senses
 from tussock.navigation.studies.outbound_paths import random_flights
 from tussock.navigation.studies.protocols import STONE2017
 from tussock.navigation.studies.protocols import stone2017 as module

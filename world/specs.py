@@ -97,8 +97,6 @@ def own_parameters(target: Callable[..., Any]) -> Mapping[str, Any]:
 
 def split_words(text: str) -> list[str]:
     """The words of a text, separated by white space outside parentheses."""
-    if re.search(r"\([^()]*\(", text):
-        raise SettingError(f"{text!r}: parentheses inside of parentheses are not read; leave the inner ones out")
     return re.findall(r"(?:\([^()]*\)|\S)+", text)
 
 

@@ -27,7 +27,8 @@ def navigator_spec(value: Any) -> Spec:
 
 def made(spec: Spec, model: Any, seed: int) -> Navigator:
     """The navigator of a spec. Raises SettingError for what is none, and for one without a model where the eye does not see everything."""
-    if getattr(model, "mask", None) is not None and not takes(spec.target, "model"):
+    fits = takes(spec.target, "model") or not getattr(spec.target, "reads_views", True)
+    if getattr(model, "mask", None) is not None and not fits:
         raise SettingError(f"the navigator {str(spec)!r} takes no model; give no field and no mask")
     navigator = spec.make(model=model, seed=seed)
     if not isinstance(navigator, Navigator):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -74,6 +75,8 @@ class PathIntegration:
         growth: Diameter of the first loop, and what each is wider than the last (m).
         reach: Length of the vector at which an agent is half certain of it (m), where `blend` asks.
     """
+
+    reads_views: ClassVar[bool] = False
 
     arrival: float = number(0.05, above=0, unit="m")
     growth: float = number(0.3, above=0, unit="m")

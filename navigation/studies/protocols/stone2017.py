@@ -10,7 +10,7 @@ from tussock.world.progress import Progress, no_progress
 
 from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
-from ...senses import SENSES, as_senses
+from ...sense_models import SENSES, as_senses
 from ...steering.ring_circuit import CentralComplex
 from ..outbound_paths import Flight, HomeVectorErrors, errors_of, fly_home, home_vectors, random_flights
 from ..sensed_paths import errors_of_senses
