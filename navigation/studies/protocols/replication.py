@@ -175,7 +175,7 @@ def _headline(outcomes: list[Outcome], *others: str) -> str:
     return "; ".join(parts) + "." if parts else ""
 
 
-def _compared(protocol: Protocol | DatabaseProtocol) -> str:
+def _compared(protocol: AnyProtocol) -> str:
     """What a protocol compares: "navigator" where there are several, or else "model"."""
     return "navigator" if isinstance(protocol, Protocol) and len(protocol.axes.get("navigator", ())) > 1 else "model"
 
