@@ -20,6 +20,7 @@ from tussock.navigation.walker import Step
 
 ALONG = {"offset_m": 0.2, "heading_noise_deg": 5.0}  # along a route
 HOME = {
+    "offset_m": 0.0,
     "goal_walk_m": 2.0,
     "release_m": 0.8,
     "release_deg": 140.0,
@@ -28,7 +29,7 @@ HOME = {
     "max_steps": 200,
 }  # to a place
 NAMED = {  # what the walks of the pictures have that is not as for ALONG, and which signals are drawn
-    "scan": {},
+    "oscillator": {"encoding": "foreground-mask | blur 1", "size": "72x15"},
     "stepped-scan": {"navigator": "stepped-scan width_deg=120 step_deg=10"},
     "homing": HOME | {"goal_only": True},
     "average-landmark-vector": HOME,
