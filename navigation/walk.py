@@ -23,7 +23,7 @@ from .body import Body
 from .displacement import Displacement
 from .encoding import Encoding
 from .sense_models import Senses
-from .steering.navigator import Images, Look, Motion, Navigator, PathIntegrating, check_motion
+from .steering.navigator import Images, Look, Motion, Navigator, PathIntegrating, check_motion, tell_put_back
 from .stopping import StoppingRules, StopReason
 from .threads import one_torch_thread
 from .walker import Step, Walker
@@ -97,8 +97,8 @@ class Walk:
         while walking := self.walking:
             for agent in walking:
                 memory = memories[agent.number]
-                if agent.reset is not None and hasattr(memory, "resume"):  # it is told where it was put back
-                    memory.resume(agent.along / self.route.length)
+                if agent.reset is not None:
+                    tell_put_back(memory, agent.along / self.route.length)
             look = self.look()
             with one_torch_thread():
                 motion = navigator.decide(look, [memories[agent.number] for agent in walking])
@@ -137,7 +137,7 @@ class Walk:
         if agents:
             heights = self.world.ground_height(np.array([agent.pose[:2] for agent in agents]))
             for agent, height in zip(agents, heights.tolist(), strict=True):
-                agent.tread(height)
+                agent.stand_on(height)
             deviation, along = self.route.nearest(np.array([agent.pose[:2] for agent in agents]))
             nearest = [Pose(*pose) for pose in self.route.at(along).tolist()]
             for agent, far, distance, pose in zip(agents, deviation.tolist(), along.tolist(), nearest, strict=True):
@@ -163,8 +163,8 @@ class Walk:
 
 def _last_step(agent: Walker) -> tuple[Pose, Pose]:
     """Where an agent stood before its step, and where it stands now."""
-    assert agent.trodden is not None
-    return agent.trodden[0], agent.pose
+    assert agent.before_step is not None
+    return agent.before_step[0], agent.pose
 
 
 def _each(setting: Any, count: int) -> Sequence[Any]:

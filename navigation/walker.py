@@ -117,7 +117,7 @@ class Walker:
         self.walked, self.touched, self.displaced = 0.0, False, False  # since the look before
         self.reset: StopReason | None = None
         self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
-        self.trodden: tuple[Pose, float] | None = (
+        self.before_step: tuple[Pose, float] | None = (
             None  # where it stood before its step, and how high; None after being put back
         )
         self.stopped: StopReason | None = None  # by the ground
@@ -149,21 +149,21 @@ class Walker:
             self.reason = StopReason.OFF_GROUND  # nothing can stand there, so it stays where it is
             return False
         self.pose = Pose(x, y, self.pose.heading).rounded()
-        self.displaced, self.trodden = True, None
+        self.displaced, self.before_step = True, None
         return True
 
     def block(self, x: float, y: float) -> None:
         """End its step where an obstacle did not let it go on (m)."""
-        before, _ = self.trodden or (self.pose, 0.0)
+        before, _ = self.before_step or (self.pose, 0.0)
         self.pose = Pose(x, y, self.pose.heading).rounded()
         self.walked, self.touched = float(np.hypot(x - before.x, y - before.y)), True
 
-    def tread(self, height: float) -> None:
+    def stand_on(self, height: float) -> None:
         """Take in the height of the ground at its pose (m). It does not make a step that the ground does not allow."""
         terrain = self.walk.world.terrain
         self.stopped = None
-        if terrain is not None and self.trodden is not None:
-            before, height_before = self.trodden
+        if terrain is not None and self.before_step is not None:
+            before, height_before = self.before_step
             self.stopped = self._obstacle(terrain, before, height - height_before)
             if self.stopped is not None:
                 self.pose, height = Pose(before.x, before.y, self.pose.heading), height_before
@@ -228,7 +228,7 @@ class Walker:
         )
         self.reset = self.reason if put_back else None
         self.ended = step.reason is not None
-        self.trodden = None if put_back else (pose, self.height)
+        self.before_step = None if put_back else (pose, self.height)
         self.walked, self.touched, self.displaced = 0.0, False, False
         if put_back:
             self.pose = self.stop_check.put_back()

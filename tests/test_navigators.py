@@ -47,7 +47,7 @@ NOT_MIRRORED: dict[str, str] = {}  # names, and why a mirrored world does not mi
 NAMES = list(NAVIGATORS.builtin)
 EYE = Eye(width=36, height=8, samples=2)
 TINY = World.generate("tiny", 2)
-WORLD = dataclasses.replace(TINY, field=Bounds(-9.0, -9.0, 9.0, 9.0))  # which nobody leaves
+WORLD = dataclasses.replace(TINY, field=Bounds(-9.0, -9.0, 9.0, 9.0))  # which no walk leaves
 ROUTE = Route(generate_route(TINY, 2, 1.6).poses)
 ENCODING = Encoding.named(
     "grey | normalise", resize=1

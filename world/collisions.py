@@ -6,7 +6,7 @@ comes within its radius of an edge or a corner.
 
 A body that begins a step closer to an obstacle than its radius, such as at a start among stems, is for this step as small as its
 clearance there. Its clearance never falls below that, and it gets out wherever a body of that size finds a way. Where
-its middle is inside a footprint, it may only go where the nearest edge of that gets no farther away. Without area there is no inside:
+its middle is inside a footprint, it may not go farther away from the nearest edge of that. Without area there is no inside:
 from exactly on a blade of grass it may go to either side. A body inside a stone, whose footprints share edges, may so be held.
 
 The distance to a convex shape is a convex function along a line. So a step that does not come closer at first never does, and a

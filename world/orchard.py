@@ -30,7 +30,7 @@ def orchard(seed: int, trees: int = 15, reach: float = 50.0, apart: float = 5.0,
         height: Their median height (m).
 
     Raises:
-        SettingError: For invalid values, and where there is no room for so many trees.
+        SettingError: For invalid values, and where the trees do not fit.
     """
     for name, value, low in (("trees", trees, 0), ("reach", reach, 1), ("apart", apart, 0), ("height", height, 0.2)):
         kind = "whole number" if name == "trees" else "number"

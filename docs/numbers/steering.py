@@ -99,7 +99,7 @@ def lines_of(steps: Sequence[Step]) -> dict[str, np.ndarray]:
         if values[0].ndim == 0:
             lines[name.replace("_", " ")] = [float(value) for value in values]
         elif values[0].shape == (2,):
-            lines[f"length of the {name.replace('_', ' ')} (m)"] = [float(np.hypot(*value)) for value in values]
+            lines[f"length of the {name.replace('_', ' ')}"] = [float(np.hypot(*value)) for value in values]
     if not lines:
         lines["turn (degrees)"] = [math.degrees(step.aim) for step in steps]
     return {name: np.array(values) for name, values in lines.items()}

@@ -35,7 +35,7 @@ MARKS = {cause_entity(cause): colour for cause, colour in CAUSE_COLOURS.items()}
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """What of a walk there is to show; of what there is not, there is no panel.
+    """What a recording of a walk shows: panels exist only for these.
 
     Attributes:
         recognised: Learned views that are recognised.

@@ -12,7 +12,7 @@ from tussock.world.settings import converted, number, settings, whole
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
-from .combined import Remembered, learn_views, made, models_of, navigator_spec, take_trained, travel
+from .combined import Remembered, learn_each, made, models_of, navigator_spec, take_trained, travel
 from .navigator import Images, Journey, Look, Motion, Navigator
 
 
@@ -56,11 +56,11 @@ class Blend:
 
     def learn(self, views: Images) -> None:
         """Let both learn the views (n, h, w)."""
-        learn_views(self.navigators, views, None)
+        learn_each(self.navigators, views, None)
 
     def learn_at(self, views: Images, places: Float[np.ndarray, "n 3"]) -> None:
         """Let both learn the views (n, h, w), and where they were seen (n, 3), if they do."""
-        learn_views(self.navigators, views, places)
+        learn_each(self.navigators, views, places)
 
     def begin(self) -> Remembered:
         """What an agent remembers for each of them."""

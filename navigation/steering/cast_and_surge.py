@@ -15,10 +15,9 @@ from tussock.world.settings import choice, number, settings
 from ..models.base import FamiliarityModel, Following, SequenceModel
 from ..scan import scan_window
 from .memories import Memory, learned_before
-from .navigator import Images, Look, Motion
+from .navigator import SIDES, Images, Look, Motion, tell_put_back
 from .scan import best_familiarity, scan_motion
 
-SIDES = {"left": 1.0, "right": -1.0}
 TOLERANCE = 1e-6  # m; so that legs have the same number of steps whatever their sum rounds to
 
 
@@ -59,7 +58,7 @@ class CastAndSurge:
     growth: float = number(2.0, low=1)
     smoothing: float = number(0.3, above=0, high=1)
     rise: float = number(0.03, low=0)
-    first: str = choice("left", SIDES)
+    first: str = choice("left", tuple(SIDES))
     memory: Memory | None = attrs.field(init=False, default=None)
 
     def learn(self, views: Images) -> None:
@@ -135,7 +134,7 @@ class Casting:
         way: Heading of the last familiar view (rad, by its compass); None before its first look.
         casting: Whether it casts.
         walked: Of the present cast (m).
-        usual: Running mean of unfamiliarity; None before its first look.
+        mean_unfamiliarity: Running mean of unfamiliarity; None before its first look.
         greatest: The greatest unfamiliarity so far, at least 1.
     """
 
@@ -145,18 +144,17 @@ class Casting:
     way: float | None = None
     casting: bool = False
     walked: float = 0.0
-    usual: float | None = None
+    mean_unfamiliarity: float | None = None
     greatest: float = 1.0
 
     def take_in(self, unfamiliarity: float, weight: float) -> float:
         """Add a look to the running mean and the greatest; how far its unfamiliarity is below what was usual before it."""
         self.greatest = max(self.greatest, unfamiliarity)
-        before = unfamiliarity if self.usual is None else self.usual
-        self.usual = before + weight * (unfamiliarity - before)
+        before = unfamiliarity if self.mean_unfamiliarity is None else self.mean_unfamiliarity
+        self.mean_unfamiliarity = before + weight * (unfamiliarity - before)
         return before - unfamiliarity
 
     def resume(self, progress: float) -> None:
         """Begin again where it was put back, after this share (0 to 1) of the learned sequence, the way ahead."""
-        if hasattr(self.following, "resume"):
-            self.following.resume(progress)  # type: ignore[union-attr]
-        self.way, self.casting, self.usual, self.walked = None, False, None, 0.0
+        tell_put_back(self.following, progress)
+        self.way, self.casting, self.mean_unfamiliarity, self.walked = None, False, None, 0.0

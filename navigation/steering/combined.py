@@ -11,7 +11,7 @@ from tussock.world.errors import SettingError
 from tussock.world.specs import Spec, takes
 
 from ..models.base import FamiliarityModel
-from .navigator import Images, Journey, LearningPlaces, Navigator, PathIntegrating
+from .navigator import Images, Journey, LearningPlaces, Navigator, PathIntegrating, tell_put_back
 from .registry import NAVIGATORS
 
 
@@ -41,7 +41,7 @@ def take_trained(navigators: Sequence[Navigator]) -> bool:
     return all(getattr(navigator, "takes_trained", True) for navigator in navigators)
 
 
-def learn_views(navigators: Sequence[Navigator], views: Images, places: Float[ndarray, "n 3"] | None) -> None:
+def learn_each(navigators: Sequence[Navigator], views: Images, places: Float[ndarray, "n 3"] | None) -> None:
     """Let navigators learn the views of a route; `places` for those that learn them, too."""
     for navigator in navigators:
         if places is not None and isinstance(navigator, LearningPlaces):
@@ -69,8 +69,7 @@ class Remembered:
     def resume(self, progress: float) -> None:
         """Tell each that the agent was put back, after this share (0 to 1) of the route."""
         for part in self.parts:
-            if hasattr(part, "resume"):
-                part.resume(progress)
+            tell_put_back(part, progress)
 
 
 def travel(navigators: Sequence[Navigator], memory: Remembered, journey: Journey) -> None:

@@ -15,7 +15,7 @@ from tussock.world.settings import choice, number, settings
 
 from ..models.base import FamiliarityModel
 from .memories import Memory
-from .navigator import Images, Look, Motion
+from .navigator import SIDES, Images, Look, Motion
 from .places import Places, index_of_goal, needs_places
 
 
@@ -50,7 +50,7 @@ class ImageGradient:
 
     model: FamiliarityModel = attrs.field()
     angle: float = number(radians(90.0), above=0, high=np.pi, unit="rad")
-    first: str = choice("left", ("left", "right"))
+    first: str = choice("left", tuple(SIDES))
     memory: Memory = attrs.field(init=False)
     facing: float = attrs.field(init=False)
 
@@ -75,8 +75,7 @@ class ImageGradient:
         fallen = difference < [memory.difference for memory in memories]
         for memory, now in zip(memories, difference.tolist(), strict=True):
             memory.difference = now
-        side = 1 if self.first == "left" else -1
-        turn = np.where(fallen, 0.0, side * self.angle)
+        turn = np.where(fallen, 0.0, SIDES[self.first] * self.angle)
         looks = None if getattr(self.model, "mask", None) is None else np.full(len(look), 2)  # it turns to look, and on
         return Motion(turn=turn, looks=looks, signals={"difference": difference})
 

@@ -15,8 +15,8 @@ from tussock.world.settings import choice, converted, number, settings, whole
 from tussock.world.specs import Spec
 
 from ..models.base import FamiliarityModel
-from .combined import Remembered, learn_views, made, models_of, navigator_spec, take_trained, travel
-from .navigator import Images, Journey, Look, Motion, Navigator
+from .combined import Remembered, learn_each, made, models_of, navigator_spec, take_trained, travel
+from .navigator import SIDES, Images, Journey, Look, Motion, Navigator
 
 
 @settings
@@ -44,7 +44,7 @@ class LoopBreaker:
     progress: float = number(0.1, low=0, high=1)
     escape: float = number(0.2, above=0, unit="m")
     aside: float = number(np.pi / 6, low=0, high=np.pi, unit="rad")
-    first: str = choice("left", ("left", "right"))
+    first: str = choice("left", tuple(SIDES))
     seed: int = whole(0, low=0)
     steers: Navigator = attrs.field(init=False)
 
@@ -63,15 +63,15 @@ class LoopBreaker:
 
     def learn(self, views: Images) -> None:
         """Let the navigator learn the views (n, h, w)."""
-        learn_views([self.steers], views, None)
+        learn_each([self.steers], views, None)
 
     def learn_at(self, views: Images, places: Float[np.ndarray, "n 3"]) -> None:
         """Let the navigator learn the views (n, h, w), and where they were seen (n, 3), if it does."""
-        learn_views([self.steers], views, places)
+        learn_each([self.steers], views, places)
 
     def begin(self) -> "LoopMemory":
         """What an agent remembers: the navigator's part, and its own steps."""
-        return LoopMemory([self.steers.begin()], side=1.0 if self.first == "left" else -1.0)
+        return LoopMemory([self.steers.begin()], side=SIDES[self.first])
 
     def travel(self, memory: "LoopMemory", journey: Journey) -> None:
         """Take in the way out from the goal."""

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from tussock.world.errors import SettingError
 
 Images = Float32[torch.Tensor, "n h w"]
+SIDES = {"left": 1.0, "right": -1.0}  # choices of a navigator's parameter `first`, and the signs of turns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,6 +168,12 @@ class LearningPlaces(Navigator, Protocol):
             places: (n, 3) Where they were seen, from the goal (m, east and north), and the heading (rad), as the agent measured them.
         """
         ...
+
+
+def tell_put_back(memory: Any, progress: float) -> None:
+    """Tell what an agent remembers that it was put back on the route, after this share (0 to 1) of it; not all minds that."""
+    if hasattr(memory, "resume"):
+        memory.resume(progress)
 
 
 def check_motion(motion: Motion, n: int, navigator: Navigator) -> None:

@@ -13,9 +13,7 @@ from tussock.world.settings import choice, number, settings
 
 from ..models.base import FamiliarityModel
 from .memories import Memory, turned
-from .navigator import Images, Look, Motion
-
-SIDES = {"left": 1.0, "right": -1.0}
+from .navigator import SIDES, Images, Look, Motion
 
 
 @dataclass

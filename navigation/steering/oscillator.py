@@ -12,8 +12,7 @@ from tussock.world.settings import choice, number, settings
 
 from ..models.base import FamiliarityModel
 from .memories import Memory
-from .navigator import Images, Look, Motion
-from .opponent import SIDES
+from .navigator import SIDES, Images, Look, Motion
 
 
 @dataclass

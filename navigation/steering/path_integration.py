@@ -47,7 +47,7 @@ class Search:
 
 
 @dataclass(kw_only=True)
-class HomeVector:
+class IntegratedPath:
     """What one agent remembers.
 
     Attributes:
@@ -85,15 +85,15 @@ class PathIntegration:
     def learn(self, views: Images) -> None:
         """Learn nothing: it steers without views."""
 
-    def begin(self) -> HomeVector:
+    def begin(self) -> IntegratedPath:
         """A vector of no length."""
-        return HomeVector(home=np.zeros(2))
+        return IntegratedPath(home=np.zeros(2))
 
-    def travel(self, memory: HomeVector, journey: Journey) -> None:
+    def travel(self, memory: IntegratedPath, journey: Journey) -> None:
         """Take in the way from the goal to where the walk begins."""
         memory.home = memory.home - journey.vector
 
-    def decide(self, look: Look, memories: Sequence[HomeVector]) -> Motion:
+    def decide(self, look: Look, memories: Sequence[IntegratedPath]) -> Motion:
         """Turn each agent towards its goal, or along its search."""
         walked = distance_walked(look, "path-integration")
         homes = np.array([memory.home for memory in memories]) - walked[:, None] * _ahead(look.compass)

@@ -14,7 +14,7 @@ from tussock.world.settings import number, settings, switch, whole
 
 from ..models.base import FamiliarityModel, Following, SequenceModel, SnapshotModel
 from ..scan import best_turn, coarse_to_fine, scan_window
-from .navigator import Images, Look, Motion, ScanRecord
+from .navigator import Images, Look, Motion, ScanRecord, tell_put_back
 
 
 @settings
@@ -150,5 +150,4 @@ class Between:
 
     def resume(self, progress: float) -> None:
         """Go on after this share (0 to 1) of the learned sequence."""
-        if hasattr(self.following, "resume"):
-            self.following.resume(progress)  # type: ignore[union-attr]
+        tell_put_back(self.following, progress)

@@ -1,6 +1,6 @@
 """Random ways out, and how well a central complex knows the way home from their ends: the experiment of Stone et al. (2017).
 
-There is no world: a bee flies by the paper's simple physics. Distances are in the paper's unit, the way of one step of time at the
+This needs no world: a bee flies by the paper's simple physics. Distances are in the paper's unit, the way of one step of time at the
 speed that saturates the flow neurons.
 """
 

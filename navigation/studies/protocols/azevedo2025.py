@@ -172,7 +172,7 @@ def _closer(results: StudyResults, column: str) -> Decision:
     table = results.tables["differences"]
     row = table[(table["starts"] == ALL) & (table["measure"] == label) & (table["strategy"] == CAST)]
     if row.empty:
-        return Decision(obtained, None, reason=f"there are no walks with {BY_VIEW} and with {CAST}")
+        return Decision(obtained, None, reason=f"walks with {BY_VIEW}, or with {CAST}, are missing")
     difference, p = (float(row[name].iloc[0]) for name in (f"less {BY_VIEW}", "p (Holm)"))
     effect = over_routes(
         f"{label}, {BY_VIEW} minus {CAST}", results.tables["walks"], column, lambda means: means[BY_VIEW] - means[CAST]

@@ -26,7 +26,7 @@ def walks_of(protocol: Protocol, sweep: Sweep, out: Path) -> tuple[pd.DataFrame,
         the number of runs that could not be made, by the reason.
 
     Raises:
-        SettingError: There is no walk at all, or none with one of the models.
+        SettingError: Without any walk, and without one of some model.
     """
     keys = {key_of(run) for run in sweep.experiments}
     with Store(out, read_only=True) as store:

@@ -236,8 +236,8 @@ def check_models(walks: pd.DataFrame, models: list[str]) -> None:
 
 
 @settings
-class DatabaseProtocol:
-    """A published experiment on published images, in which nothing walks.
+class WalklessProtocol:
+    """What published experiments in which nothing walks have in common.
 
     Attributes:
         name: Name of the command.
@@ -248,7 +248,6 @@ class DatabaseProtocol:
         differences: From the original, a sentence each.
         claims: What the paper claims.
         items: Figures and tables of the report.
-        measure: Computes the results from the folder of the images, a seed, and a function that is called with how much is done.
     """
 
     name: str
@@ -259,6 +258,16 @@ class DatabaseProtocol:
     differences: Sequence[str] = ()
     claims: Sequence[Claim] = ()
     items: Sequence[Item]
+
+
+@settings
+class DatabaseProtocol(WalklessProtocol):
+    """A published experiment on published images.
+
+    Attributes:
+        measure: Computes the results from the folder of the images, a seed, and a function that is called with how much is done.
+    """
+
     measure: Callable[[Path, int, Progress], StudyResults]
 
 
