@@ -563,6 +563,29 @@ def start(*arguments, cwd: Path) -> subprocess.Popen:
 LONG = ["run", "--world", "tiny", "--seed", "2", "--size", "720x150", "--resize", "1"]
 
 
+IGNORED = """
+import os, signal, sys, time
+from tussock.navigation.cli.interruption import check_interrupted, end_on_signals
+
+class Closed:
+    def __del__(self):  # Python prints what is raised here, and goes on
+        os.kill(os.getpid(), int(sys.argv[1]))
+        time.sleep(1)
+
+end_on_signals()
+closed = Closed()
+del closed
+print("went on")
+check_interrupted()
+"""
+
+
+@pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, -signal.SIGINT), (signal.SIGTERM, 143)])
+def test_an_interruption_that_a_library_ignores_still_ends_the_command(end, code):
+    done = subprocess.run([sys.executable, "-c", IGNORED, str(int(end))], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (code, "went on\n"), done.stderr
+
+
 @pytest.mark.slow
 def test_ctrl_c_while_learning_leaves_the_earlier_run(capfd, tmp_path):
     tussock(capfd, *RUN, "--out", tmp_path / "run")

@@ -383,6 +383,13 @@ def test_it_steers_by_an_eye_that_sees_a_part_of_the_circle_if_it_takes_a_model(
     assert len(walks(attrs.evolve(given, stopping=StoppingRules(max_steps=3)))[0]) == 4
 
 
+def test_one_that_says_so_reads_neither_compass_nor_odometer(name):
+    ideal, noisy = (walks(experiment(name, senses=senses))[0] for senses in ("ideal", "ant compass_deg=60 speed=0.9"))
+    navigator = spec(name).make(model=RandomHeadings())
+    same = [decided(step) for step in ideal] == [decided(step) for step in noisy]
+    assert same or getattr(navigator, "reads_senses", True)
+
+
 @pytest.fixture(scope="module")
 def model_file(tmp_path_factory) -> Path:
     """A model that has learned the route."""

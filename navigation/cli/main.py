@@ -5,7 +5,6 @@ import atexit
 import gc
 import json
 import os
-import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -21,6 +20,7 @@ import tyro
 from tussock.world.errors import InputError
 
 from ..setting_names import message_of
+from .interruption import end_on_signals
 from .terminal import library_messages, message, show
 
 # Where the class of a command is, by its name; or a sentence and the commands that go under one name.
@@ -77,7 +77,7 @@ def main(arguments: list[str] | None = None) -> None:
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
         description="Insect visual route navigation: make a world, look around in it, learn a route, walk it home.",
     )
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is open is closed and viewers are ended
+    end_on_signals()
     try:
         if command.json:
             with library_messages(), standard_output_as_error():

@@ -225,12 +225,14 @@ class RunCommand(RunOptions):
 
     def run(self) -> dict[str, Any]:
         from ..recording.run_folder import check_run_folder, record_run
+        from .unused_flags import warn_of_unused_flags
 
         viewer = self.viewer if self.live else None
         given = (self.world, self.route, self.route_database, self.grid_database)
         files = [Path(name) for name in given if name is not None]
         check_run_folder(self.out, overwrite=self.overwrite, inputs=files, viewer=viewer)
         experiment = self.experiment()
+        warn_of_unused_flags(experiment)
         with progress_of_parts() as report:
             parts = {part: partial(report, part) for part in ("learning", "walking")}
             return record_run(experiment, self.out, overwrite=self.overwrite, viewer=viewer, **parts)

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from logging.handlers import MemoryHandler
 from typing import Any
 
+from .interruption import check_interrupted
+
 
 def message(text: str) -> None:
     """Print something that is not the result."""
@@ -81,6 +83,7 @@ def progress(what: str, unit: str, *, verbose: bool = False) -> Iterator[Callabl
         task = bar.add_task(what, total=None)
 
         def report(done: int, total: int, **changed: Any) -> None:
+            check_interrupted()
             if pace is not None:
                 pace.reached(done, total)
                 changed["description"] = f"{what} {pace.rate:.3g} a second"

@@ -36,6 +36,7 @@ class FamiliarityModulated:
     """
 
     takes_trained: ClassVar[bool] = False
+    reads_senses: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     narrow: float = number(radians(40.0), above=0, high=2 * np.pi, unit="rad")

@@ -22,6 +22,7 @@ class Homing(Scan):
     """
 
     takes_trained: ClassVar[bool] = False
+    reads_senses: ClassVar[bool] = True  # it learns its places by them
 
     def learn(self, views: Images) -> None:
         """Refuse views without places. Raises SettingError."""

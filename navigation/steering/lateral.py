@@ -34,6 +34,7 @@ class Lateral:
     """
 
     takes_trained: ClassVar[bool] = False
+    reads_senses: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     gain: float = number(8.0, above=0, unit="rad")

@@ -122,6 +122,7 @@ class Navigator(Protocol):
 
     One navigator steers any number of agents side by side. A class is registered (docs/extending.md), and made with an untrained
     familiarity model as `model`. One that must learn the views itself, and so cannot use a model from a file, says `takes_trained = False`.
+    One that makes no use of compass and odometer says `reads_senses = False`, so that a person who gives them noise is told.
     """
 
     def learn(self, views: Images) -> None:

@@ -45,6 +45,7 @@ class Opponent:
     """
 
     takes_trained: ClassVar[bool] = False
+    reads_senses: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     baseline: float = number(radians(90.0), low=0, high=np.pi, unit="rad")

@@ -42,6 +42,7 @@ class Oscillator:
     """
 
     takes_trained: ClassVar[bool] = False
+    reads_senses: ClassVar[bool] = False
 
     model: FamiliarityModel = attrs.field()
     base: float = number(radians(20.0), low=0, high=np.pi, unit="rad")

@@ -40,6 +40,11 @@ class Scan:
     every: int = whole(1)
     coarse: float = number(0.0, low=0, high=np.pi, unit="rad")
 
+    @property
+    def reads_senses(self) -> bool:
+        """Whether the compass matters: for the direction in the middle of the window."""
+        return self.about is not None
+
     def learn(self, views: Images) -> None:
         """Train the model on the views."""
         self.model.fit(views)

@@ -231,7 +231,12 @@ def cluster(workers: str | int | None) -> Iterator[Client]:
         else:
             prepare_workers()
             stack.enter_context(dask.config.set({"distributed.worker.multiprocessing-method": METHOD}))
-            local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)
+            try:
+                local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)
+            except RuntimeError as error:
+                raise MissingDependencyError(
+                    f"the workers of this sweep did not start ({error}); was one killed, as where memory is short? Try again, with --workers 1"
+                ) from error
             scheduler = stack.enter_context(local).scheduler_address
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are reported in one line, below
         try:
