@@ -235,7 +235,7 @@ def cluster(workers: str | int | None) -> Iterator[Client]:
                 local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)
             except RuntimeError as error:
                 raise MissingDependencyError(
-                    f"the workers of this sweep did not start ({error}); was one killed, as where memory is short? Try again, with --workers 1"
+                    f"the workers of this sweep did not start ({error}); if memory is short, give --workers 1"
                 ) from error
             scheduler = stack.enter_context(local).scheduler_address
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # errors are reported in one line, below
