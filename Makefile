@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: run test test-slow lint format bench bench-jobs numbers numbers-slow clean
+.PHONY: run test test-slow docs lint format bench bench-jobs numbers numbers-slow clean
 
 run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, and print how to watch it
 	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
@@ -23,6 +23,10 @@ test: $(VENV)/developer  ## the quick tests, on all cores
 
 test-slow: $(VENV)/developer  ## the tests that take long: killed processes, full disks, whole studies, browsers
 	$(BIN)/pytest -n auto -m slow
+
+docs: $(VENV)/documenter  ## the documentation site, into docs/_build; needs no network; a broken link or page fails
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -b html docs docs/_build
+	@echo "The documentation is in docs/_build/index.html"
 
 lint: $(VENV)/developer  ## style, types, and which room may know which
 	$(BIN)/ruff check .
@@ -58,5 +62,9 @@ $(VENV)/developer: $(VENV)/installed
 	mkdir -p $(VENV)/clone && ln -sfn ../.. $(VENV)/clone/tussock  # where pyright finds the package
 	touch $@
 
+$(VENV)/documenter: $(VENV)/installed
+	$(PIP) -e '.[docs]'
+	touch $@
+
 clean:
-	rm -rf $(VENV) run world.glb world.png
+	rm -rf $(VENV) run world.glb world.png docs/_build docs/recipes

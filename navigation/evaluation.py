@@ -149,6 +149,26 @@ def recovered_headings(
     return wrap_angle(facing + best_turn(scans.cpu().numpy(), windows))
 
 
+def heading_field(
+    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, positions: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n 3"]:
+    """The most familiar heading at each of some positions, among all headings.
+
+    Args:
+        model: A trained model.
+        encoding: That of the views that it learned.
+        renderer: Draws the views.
+        positions: (n, 2) Where to look around (m).
+
+    Returns:
+        (n, 3) The positions (m) with these headings (rad).
+    """
+    poses, headings = facing_east(positions), [np.empty(0)]
+    for views in encoded_views(encoding, renderer, poses):
+        headings.append(recovered_headings(model, views, np.zeros(len(views))))
+    return np.column_stack([poses[:, :2], np.concatenate(headings)])
+
+
 def heading_errors(
     model: FamiliarityModel,
     encoding: Encoding,

@@ -9,6 +9,8 @@ from .files import write_world as write_world
 from .geometry import Bounds as Bounds
 from .geometry import Pose as Pose
 from .geometry import Route as Route
+from .geometry import column_azimuths as column_azimuths
+from .geometry import turn_of_columns as turn_of_columns
 from .meshes.reading import MeshReading as MeshReading
 from .params import WorldParams as WorldParams
 from .route_files import read_route as read_route

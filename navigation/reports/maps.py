@@ -45,7 +45,7 @@ def write_overview(
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8, 8.4), layout="constrained")
         axes = figure.add_subplot()
-        _draw_world(axes, world)
+        draw_world(axes, world)
         if views is not None:
             axes.plot(*views.T, ".", color=SOFT_COLOUR, ms=2.5, zorder=0, label="views")
         if route is not None:
@@ -116,7 +116,13 @@ def draw_arrows(axes: Axes, x, y, heading_deg, colour, length=ARROW, **style) ->
     axes.quiver(x, y, np.cos(angle) * length, np.sin(angle) * length, **style)
 
 
-def _draw_world(axes: Axes, world: World) -> None:
+def draw_world(axes: Axes, world: World) -> None:
+    """Draw a world from above, its field with a little around it; lower surfaces below higher ones.
+
+    Args:
+        axes: Of matplotlib, in metres.
+        world: The world.
+    """
     triangles, rgb = world.surfaces()
     above_ground = triangles[..., 2].max(axis=1) - np.nan_to_num(world.ground_height(triangles[..., :2].mean(axis=1)))
     order = above_ground.argsort(kind="stable")  # lower ones first, so that higher ones cover them
@@ -143,7 +149,7 @@ def _image_from_above(world: World, part: Bounds) -> UInt8[np.ndarray, "h w 4"]:
     figure = Figure(figsize=(across / max(across, up), up / max(across, up)), dpi=MAP_PIXELS)
     drawn = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
-    _draw_world(axes, visible)
+    draw_world(axes, visible)
     axes.set(xlim=(part.x_min, part.x_max), ylim=(part.y_min, part.y_max), aspect="auto")
     axes.axis("off")
     drawn.draw()

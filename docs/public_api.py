@@ -1,0 +1,32 @@
+"""Makes the pages of the public API strict: what has no docstring, or an array without a shape, is a warning, and so fails the build."""
+
+import inspect
+import re
+from typing import Any
+
+from sphinx.util import logging
+
+BARE = re.compile(
+    r"(?<![\w\[.])(?:np\.ndarray|numpy\.ndarray|torch\.Tensor|Tensor)(?![\w\]])"
+)  # and not Float[np.ndarray, "n h w"]
+
+log = logging.getLogger(__name__)
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", check)
+    return {"parallel_read_safe": True}
+
+
+def check(app: Any, kind: str, name: str, found: Any, options: Any, lines: list[str]) -> None:
+    """Warn of an object of the public API that a reader could not use from its page alone."""
+    if kind not in ("class", "function", "method"):
+        return
+    if not any(map(str.strip, lines)):
+        log.warning("%s has no docstring", name, location=name)
+    if kind == "class" or not callable(found):
+        return
+    for each, annotation in getattr(inspect.unwrap(found), "__annotations__", {}).items():
+        if BARE.search(str(annotation)):
+            log.warning("%s: %s is an array without a shape (%s)", name, each, annotation, location=name)

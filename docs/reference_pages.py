@@ -1,0 +1,201 @@
+"""Pages of the reference that are made of the code: the commands, the parameters of worlds, and the settings of runs.
+
+A Sphinx extension: it writes them into docs/reference before Sphinx reads the pages.
+"""
+
+import ast
+import dataclasses
+import inspect
+import itertools
+import re
+import textwrap
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from tussock.navigation.cli.main import COMMANDS, commands_for
+from tussock.navigation.cli.options import RunOptions
+from tussock.navigation.settings_table import TYPES
+from tussock.world.params import PRESETS, WORLDS, WorldParams
+from tussock.world.settings import describe
+
+FOLDER = Path(__file__).parent / "reference"
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Called by Sphinx."""
+    app.connect("builder-inited", lambda _: write_pages(FOLDER))
+    return {"parallel_read_safe": True}
+
+
+def write_pages(folder: Path) -> None:
+    """Write the pages that are made of the code; a page that would be the same is left as it is, so that it is not built again."""
+    for name, text in {"commands": commands(), "worlds": worlds(), "settings": run_settings()}.items():
+        page = folder / f"{name}.md"
+        if not page.exists() or page.read_text(encoding="utf-8") != text:
+            page.write_text(text, encoding="utf-8")
+
+
+def commands() -> str:
+    """All commands, with their flags."""
+    text = [
+        "# Commands",
+        "",
+        "Every command and flag, as `tussock COMMAND --help` has them. All print one JSON object with `--json`.",
+        "",
+    ]
+    for name in COMMANDS:
+        found = commands_for([name])[name]
+        if isinstance(found, tuple):
+            text += [f"## tussock {name}", "", found[0], ""]
+            for below, command in found[1].items():
+                text += _command(f"{name} {below}", command, "###")
+        else:
+            text += _command(name, found, "##")
+    return "\n".join(text) + "\n"
+
+
+def _command(name: str, command: type, level: str) -> list[str]:
+    rows = [(_flag(each), _default(each), help_of(command, each.name)) for each in dataclasses.fields(command)]
+    return [
+        f"{level} tussock {name}",
+        "",
+        inspect.getdoc(command) or "",
+        "",
+        *table(("flag", "default", "meaning"), rows),
+    ]
+
+
+def _flag(field: dataclasses.Field) -> str:
+    positional = "Positional" in str(field.type)
+    return f"`{field.name.upper() if positional else '--' + field.name.replace('_', '-')}`"
+
+
+def _default(field: dataclasses.Field) -> str:
+    if field.default is dataclasses.MISSING:
+        return "required" if field.default_factory is dataclasses.MISSING else ""
+    if field.default is None or field.default is False or field.default == "":
+        return ""
+    return f"`{field.default:.6g}`" if isinstance(field.default, float) else f"`{field.default}`"
+
+
+def help_of(command: type, name: str) -> str:
+    """What a flag of a command means: what its annotation says, or else the text below it in the class, or in one that it is made of."""
+    hint = get_type_hints(command, include_extras=True)[name]
+    told = [getattr(each, "help", None) for each in _notes(hint)]
+    if any(told):
+        return next(filter(None, told))
+    return next((texts[name] for cls in command.__mro__ if name in (texts := _texts(cls))), "")
+
+
+def _notes(hint: Any) -> Iterable[Any]:
+    """What annotations say beside the type."""
+    if hasattr(hint, "__metadata__"):
+        yield from hint.__metadata__
+        yield from _notes(hint.__origin__)
+    elif get_origin(hint) is not None:
+        for each in get_args(hint):
+            yield from _notes(each)
+
+
+@cache
+def _texts(cls: type) -> dict[str, str]:
+    """The text below each field of a class."""
+    if not dataclasses.is_dataclass(cls):
+        return {}
+    try:
+        source = textwrap.dedent(inspect.getsource(cls))
+    except (OSError, TypeError):  # it was made while the program ran
+        return {}
+    (body,) = [each.body for each in ast.parse(source).body if isinstance(each, ast.ClassDef)]
+    return {
+        field.target.id: " ".join(inspect.cleandoc(text.value.value).split())
+        for field, text in itertools.pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)
+    }  # fmt: skip
+
+
+def worlds() -> str:
+    """The presets of worlds, and all parameters with unit and range."""
+    told = attributes(WorldParams)
+    fields = describe(WorldParams)
+    rows = [
+        (
+            f"`{name}`",
+            told[name],
+            each.get("unit", ""),
+            _range(each),
+            *(_value(WORLDS.find(preset)(), name) for preset in PRESETS),
+        )
+        for name, each in fields.items()
+    ]
+    orchard = WORLDS.find("orchard")
+    parameters = {name: each.default for name, each in inspect.signature(orchard).parameters.items() if name != "seed"}
+    own = [(f"`{name}`", arguments(orchard)[name], f"`{default:g}`") for name, default in parameters.items()]
+    return "\n".join([
+        "# Parameters of worlds", "",
+        "A preset's name, and after it any of these parameters, is a world: `--world 'meadow field_width=20 trees=0'`. A value outside its "
+        "range is refused. In Python: `World.generate(WorldParams(field_width=20, trees=0), seed=7)`.", "",
+        "`tussock-field`, `meadow`, `scrub` and `tiny` have the same parameters, with other defaults:", "",
+        *table(("parameter", "meaning", "unit", "range", *PRESETS), rows), "",
+        "## orchard", "", (inspect.getdoc(orchard) or "").split("\n\n")[0], "",
+        *table(("parameter", "meaning", "default"), own),
+    ]) + "\n"  # fmt: skip
+
+
+def _range(field: dict[str, Any]) -> str:
+    low, high = field.get("low"), field.get("high")
+    return "0 to 255 each" if low is None or high is None else f"{low:g} to {high:g}"
+
+
+def _value(params: WorldParams, name: str) -> str:
+    value = getattr(params, name)
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else f"{value:g}"
+
+
+def run_settings() -> str:
+    """The settings of runs: columns of runs.parquet, and of the settings in summary.json."""
+    rows = [
+        (f"`{name}`", _kind(kind), help_of(RunOptions, name) if hasattr(RunOptions, name) else "")
+        for name, (kind) in TYPES.items()
+    ]
+    return "\n".join([
+        "# Settings of runs", "",
+        "Everything that decides a run. These are the columns of a sweep's `runs.parquet`, the `settings` in `summary.json`, the axes of a "
+        "[sweep file](../sweeps.md) and, with `-` in place of `_`, the flags of `tussock run`. The results beside them are in "
+        "[a walk in numbers](../trajectory.md).", "",
+        *table(("setting", "type", "meaning"), rows), "",
+        "`runs.parquet` has beside these and the results: `key` (of the run), `command` (that repeats it), `error` (why it could not be "
+        "walked), `seconds` and `learn_seconds`, and `recording` (the path of the recording, if there is one).",
+    ]) + "\n"  # fmt: skip
+
+
+def _kind(kind: Any) -> str:
+    return (
+        re.sub(r"<class '(?:\w+\.)*(\w+)'>", r"\1", str(kind)).replace("pathlib.", "").replace(" | None", ", or none")
+    )
+
+
+def attributes(cls: type) -> dict[str, str]:
+    """What a class's docstring says of each attribute."""
+    return _entries(inspect.getdoc(cls) or "", "Attributes")
+
+
+def arguments(function: Any) -> dict[str, str]:
+    """What a function's docstring says of each argument."""
+    return _entries(inspect.getdoc(function) or "", "Args")
+
+
+def _entries(text: str, section: str) -> dict[str, str]:
+    lines = re.search(rf"{section}:\n((?:    .*\n?|\n)+)", text)
+    entries = re.findall(r"^    (\w+): (.+(?:\n      +.+)*)", lines.group(1) if lines else "", flags=re.MULTILINE)
+    return {name: " ".join(words.split()) for name, words in entries}
+
+
+def table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """The lines of a table in Markdown."""
+    columns = list(columns)
+    body = [[cell.replace("|", "\\|").replace("*", "\\*") for cell in row] for row in rows]
+    return ["| " + " | ".join(each) + " |" for each in [columns, ["---"] * len(columns), *body]]
