@@ -20,4 +20,7 @@ axes = plt.figure(figsize=(7, 7)).add_subplot()
 draw_world(axes, world)
 axes.plot(*route.xy.T, color="white", lw=3)
 axes.quiver(*field[:, :2].T, np.cos(field[:, 2]), np.sin(field[:, 2]), color="crimson", scale=35, zorder=3)
-axes.set(xlim=(positions[:, 0].min() - 0.2, positions[:, 0].max() + 0.2), ylim=(positions[:, 1].min() - 0.2, positions[:, 1].max() + 0.2))
+axes.set(
+    xlim=(positions[:, 0].min() - 0.2, positions[:, 0].max() + 0.2),
+    ylim=(positions[:, 1].min() - 0.2, positions[:, 1].max() + 0.2),
+)

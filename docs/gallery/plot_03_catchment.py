@@ -8,7 +8,18 @@ from which a descent of this landscape ends at the stored view: its catchment.
 
 import matplotlib.pyplot as plt
 
-from tussock import Encoding, PerfectMemory, Pose, World, catchment, generate_route, landscape, open_renderer, positions_around, train
+from tussock import (
+    Encoding,
+    PerfectMemory,
+    Pose,
+    World,
+    catchment,
+    generate_route,
+    landscape,
+    open_renderer,
+    positions_around,
+    train,
+)
 
 world = World.generate("tussock-field", seed=7)
 home = Pose(*generate_route(world, seed=7).poses[100])

@@ -25,7 +25,9 @@ class MeanView:
 
 for model in (MeanView, "perfect-memory"):
     walk = Experiment(world="tussock-field", seed=7, model=model, route_length=4.0, start_offset=0.1).run()
-    plt.plot(walk.column("along_m"), walk.column("deviation_m"), label=f"{model if isinstance(model, str) else 'mean view'}")
+    plt.plot(
+        walk.column("along_m"), walk.column("deviation_m"), label=f"{model if isinstance(model, str) else 'mean view'}"
+    )
 plt.xlabel("distance along the route (m)")
 plt.ylabel("distance from the route (m)")
 plt.legend()

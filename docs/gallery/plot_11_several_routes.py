@@ -8,7 +8,18 @@ One memory learns three routes that end at the same place. The agent walks each 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from tussock import Encoding, PerfectMemory, Scan, Walk, World, draw_world, generate_route, open_renderer, train, training_poses
+from tussock import (
+    Encoding,
+    PerfectMemory,
+    Scan,
+    Walk,
+    World,
+    draw_world,
+    generate_route,
+    open_renderer,
+    train,
+    training_poses,
+)
 
 world, goal = World.generate("tussock-field", seed=7), (5.0, 5.0)
 routes = [generate_route(world, seed=seed, length=3.5, goal=goal) for seed in (1, 2, 3)]

@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import matplotlib.pyplot as plt
-import numpy as np
 import pandas as pd
 
 from tussock import Experiment, Eye, Sweep, run_sweep

@@ -240,7 +240,7 @@ class RunCommand(RunOptions):
 
 @dataclass
 class PlayCommand(Command):
-    """Open a run's recording in the rerun viewer."""
+    """Open a run's recording in the rerun viewer, or make a picture or a film of it."""
 
     run_folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(name="dir", metavar="DIR")]
     """Folder of the run, or its .rrd file."""
@@ -248,11 +248,23 @@ class PlayCommand(Command):
     """Serve the viewer to a browser on this machine instead of opening a window."""
     screenshot: Path | None = None
     """Save a picture (.png) of the viewer instead, without a display."""
+    video: Path | None = None
+    """Save a film of the walk instead: .mp4 (needs pip install imageio-ffmpeg), or .gif."""
+    steps_per_second: float = 10.0
+    """Speed of the film."""
 
     def run(self) -> dict[str, Any]:
         from ..recording.playback import play
 
-        return play(self.run_folder, web=self.web, screenshot=self.screenshot)
+        with progress("drawing", "steps") as report:
+            return play(
+                self.run_folder,
+                web=self.web,
+                screenshot=self.screenshot,
+                video=self.video,
+                steps_per_second=self.steps_per_second,
+                progress=report,
+            )
 
 
 def table_by_distance(errors: "HeadingErrors") -> dict[str, dict[str, float]]:

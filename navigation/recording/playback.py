@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tussock.world.errors import FileError, MissingDependencyError
+from tussock.world.progress import Progress, no_progress
 
 from .viewer import save_screenshot, watch
 
@@ -16,13 +17,24 @@ UNFINISHED = "UNFINISHED.txt"  # is in the folder of a run until all else is
 log = logging.getLogger(__name__)
 
 
-def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dict[str, Any]:
-    """Open a run's recording in the rerun viewer.
+def play(
+    run: Path,
+    *,
+    web: bool = False,
+    screenshot: Path | None = None,
+    video: Path | None = None,
+    steps_per_second: float = 10.0,
+    progress: Progress = no_progress,
+) -> dict[str, Any]:
+    """Open a run's recording in the rerun viewer, or make a picture or a film of it.
 
     Args:
         run: Folder of the run, or its recording.
         web: Serve the viewer to browsers on this machine instead of opening a window.
         screenshot: Write a picture (.png) of the viewer instead, without a display.
+        video: Write a film (.mp4 or .gif) of the walk instead.
+        steps_per_second: Its speed.
+        progress: Called with how many steps of the film are drawn, of how many.
 
     Raises:
         FileError: Where there is no recording.
@@ -38,9 +50,14 @@ def play(run: Path, *, web: bool = False, screenshot: Path | None = None) -> dic
     if screenshot is not None:
         save_screenshot(recording, screenshot)
         return {"recording": str(recording), "screenshot": str(screenshot)}
+    if video is not None:
+        from .film import save_film
+
+        steps = save_film(recording, video, steps_per_second=steps_per_second, progress=progress)
+        return {"recording": str(recording), "video": str(video), "steps": steps}
     if not web and sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise MissingDependencyError(
-            "there is no display here; add --web to watch in a browser, or --screenshot FILE.png"
+            "there is no display here; add --web to watch in a browser, --screenshot FILE.png or --video FILE.mp4"
         )
     watch(recording, web=web)
     return {"recording": str(recording)}
