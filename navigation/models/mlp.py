@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32, Float64
+from jaxtyping import Float, Float32, Float64, Num
 from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.base import BaseEstimator, ClassifierMixin
@@ -127,7 +127,7 @@ class MLP(ClassifierMixin, BaseEstimator, Model):
         second = expit(self.decision_function(views).astype(float))
         return np.column_stack([1 - second, second])
 
-    def predict(self, views: Views) -> np.ndarray:
+    def predict(self, views: Views) -> Num[np.ndarray, " n"]:
         """The more probable class of each view."""
         return self.classes_[(self.decision_function(views) > 0).astype(int)]
 

@@ -18,7 +18,6 @@ from jaxtyping import Float, Int64
 
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
-from tussock.world.errors import DiskFullError
 from tussock.world.geometry import Route, turn_of_columns
 from tussock.world.scene import World
 
@@ -26,6 +25,7 @@ from ..failures import Diagnosis
 from ..stopping import StopReason
 from ..training import training_source
 from ..walker import Step
+from . import disk
 from .blueprint import MARKS, OF_A_SCAN, TIMELINE, Shown, blueprint, image_format
 from .columns import bar_chart_columns, image_columns
 from .marks import Marks, events_of
@@ -36,7 +36,6 @@ ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 
 VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
 FLUSH_SECONDS = 0.5  # how often steps are brought to disk; a crash may lose those of twice as long
 BATCH = 32  # steps whose views are sent at once: fresh memory for more of them takes longer than copying them
-MAX_FLUSH_SECONDS = 120.0  # rerun's writer sometimes ends without an answer where the disk is full
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
 
 
@@ -108,7 +107,7 @@ class Recording:
         finally:
             self._thread.shutdown()
             for stream in self._streams:
-                stream.disconnect()
+                disk.close(stream)
 
     def _is_due(self) -> bool:
         """Whether it is time to bring steps to disk."""
@@ -159,10 +158,7 @@ class Recording:
     def _flush(self) -> None:
         """Bring what was logged to disk; rerun by itself holds small things back until there are megabytes of them."""
         file, *viewers = self._streams
-        try:
-            file.flush(timeout_sec=MAX_FLUSH_SECONDS)
-        except RuntimeError as error:
-            raise DiskFullError(f"{self._path} cannot be written any more ({error}); make room on its disk") from error
+        disk.flush(file, self._path)
         for viewer in viewers:
             try:
                 viewer.flush(timeout_sec=5)

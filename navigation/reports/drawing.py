@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Num
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image as PillowImage
@@ -128,7 +129,7 @@ def draw_lines(axes: Axes, x, curves: Mapping[str, tuple], ylabel: str = "error 
     axes.grid(axis="y", color="#00000018")
 
 
-def draw_panorama(axes: Axes, view: np.ndarray, title: str = "") -> None:
+def draw_panorama(axes: Axes, view: Num[np.ndarray, "h w *channels"], title: str = "") -> None:
     """Draw a view (h, w, 3 or 4) or a feature image (h, w), 360 degrees wide, ahead in the middle."""
     image = view[..., :3] if view.ndim == 3 else view
     axes.imshow(image, extent=(180, -180, 0, 75), cmap="gray", aspect="auto", interpolation="nearest")
