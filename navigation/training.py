@@ -215,6 +215,7 @@ def training_views(
     Raises:
         SettingError: Where no view is left.
     """
+    poses = np.asarray(poses, dtype=float)  # a list of poses will do
     images, contrasts, source = [], [], training_source(renderer)
     encoded = encoding.for_eye(renderer.eye)
     encoded.remark_on_overlap()

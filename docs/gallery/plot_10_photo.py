@@ -17,7 +17,7 @@ from tussock import Encoding, VisualCompass, turn_of_columns
 
 photo = np.asarray(Image.open(Path(tussock.__file__).with_name("assets") / "panorama.png").convert("RGB"))
 turned = np.roll(photo, photo.shape[1] // 4, axis=1)  # as seen after a turn of 90 degrees to the left
-encoding = Encoding.parse("grey | resize 8 | normalise")
+encoding = Encoding.parse("grey | resize 6 | normalise")
 compass = VisualCompass().fit(encoding(photo[None]))
 familiarity = compass.scan(encoding(turned[None]))[0].numpy()
 

@@ -31,7 +31,7 @@ from . import work
 from .spec import Sweep
 from .store import TABLE, Finished, Store, write_table, write_title
 from .work import Walked, draw, learn, walk
-from .workers import METHOD, WORK, prepare_workers
+from .workers import METHOD, WORK, prepare_workers, script_left_out
 
 log = logging.getLogger(__name__)
 
@@ -230,6 +230,7 @@ def cluster(workers: str | int | None) -> Iterator[Client]:
             scheduler = workers
         else:
             prepare_workers()
+            stack.enter_context(script_left_out())
             stack.enter_context(dask.config.set({"distributed.worker.multiprocessing-method": METHOD}))
             try:
                 local: Any = LocalCluster(n_workers=workers or core_count(), **LOCAL)

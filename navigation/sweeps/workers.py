@@ -3,6 +3,9 @@
 import multiprocessing
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.machinery import ModuleSpec
 from multiprocessing import forkserver
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # how these processes begin
@@ -27,3 +30,19 @@ def prepare_workers() -> None:
         for name in ENVIRONMENT:
             os.environ.pop(name)
         os.environ.update(before)
+
+
+@contextmanager
+def script_left_out() -> Iterator[None]:
+    """While this lasts, processes begin without running the user's script again, so that a script needs no `if __name__ == ..` for them.
+
+    Multiprocessing runs the script in each of its processes, to find classes there, unless its name is "__main__". Classes of the script
+    reach the workers all the same: Dask sends them by value.
+    """
+    script = sys.modules["__main__"]
+    before = script.__spec__
+    script.__spec__ = ModuleSpec("__main__", loader=None)
+    try:
+        yield
+    finally:
+        script.__spec__ = before
