@@ -41,7 +41,7 @@ def replication(name: str, arguments: str, *, tables: Sequence[str], texts: Text
             "could_not_run": results["could_not_run"],
             "claims": {key: {part: claim[part] for part in kept} for key, claim in results["claims"].items()},
             "numbers": results["numbers"],
-            "models": results["models"],
+            "models": results.get("models", {}),
             "tables": {each: results["tables"][each] for each in tables},
         }
 
@@ -241,6 +241,35 @@ def by_distance(values: Values) -> str:
     return markdown(columns, rows)
 
 
+def distances_by_gain(values: Values) -> str:
+    """Mean distance from the nest at the end, by the gain: a line for the mean over worlds, and its range."""
+    by_gain = table(values, "gains").groupby("gain (degrees)", sort=True)["final_m"]
+    rows = [["distance at the end: mean of six worlds (m)", *map(number, by_gain.mean())]]
+    rows.append(
+        [
+            "lowest and highest of the worlds (m)",
+            *(f"{number(low)} to {number(high)}" for low, high in zip(by_gain.min(), by_gain.max(), strict=True)),
+        ]
+    )
+    return markdown(["gain (degrees)", *(f"{gain:,.0f}" for gain in by_gain.groups)], rows)
+
+
+def distances_by_memory(values: Values) -> str:
+    """Mean distance from the nest at the end of the release test, by memory and by how the views were learned."""
+    release = table(values, "release").pivot_table("distance at the end (m)", "memories", "spread", sort=False)
+    rows = [[memories, *map(number, row)] for memories, row in zip(release.index, release.to_numpy(), strict=True)]
+    return markdown(
+        ["memories", *(f"views within {spread:g} degrees of the nest (m)" for spread in release.columns)], rows
+    )
+
+
+def shares_by_release(values: Values) -> str:
+    """Share of walks that come home, by what steers, the senses, and the distance of the start."""
+    shares = table(values, "by_distance")
+    rows = [[f"`{row.iloc[0]}`", row.iloc[1], *map(number, row.iloc[2:])] for _, row in shares.iterrows()]
+    return markdown(["navigator", "senses", *shares.columns[2:]], rows)
+
+
 def in_a_line(values: Values) -> str:
     """The size of each effect with its interval, and whether its claim holds."""
     parts = []
@@ -269,6 +298,12 @@ FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables 
         ["by_input", "differences"],
         {"inputs": apiaviz, "counts": completed},
     ),
+    "lemoel2020": (
+        "lemoel2020",
+        ["gains", "release"],
+        {"gains": distances_by_gain, "release": distances_by_memory},
+    ),
+    "beenav2026": ("beenav2026", ["by_distance"], {"shares": shares_by_release}),
 }
 MEASUREMENTS: dict[str, Measurement] = {
     name: replication(name, arguments, tables=tables, texts=texts)
