@@ -1,5 +1,6 @@
 """The Python of the documentation runs as it is printed. README.md and docs/benchmark.md have tests of their own."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -16,3 +17,32 @@ def test_the_snippets_of_a_page_run(page, tmp_path):
     done = subprocess.run([sys.executable, "-c", "\n".join(snippets)], cwd=tmp_path, capture_output=True, text=True)
     assert snippets
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("recipe", sorted((DOCS / "gallery").glob("*.py")), ids=lambda path: path.stem)
+def test_a_recipe_is_short_and_says_what_it_shows(recipe):
+    """`make docs` runs them all."""
+    source = recipe.read_text()
+    title, code = ast.parse(source).body[0], ast.parse(source).body[1:]
+    assert isinstance(title, ast.Expr)
+    imports = sum(isinstance(each, ast.Import | ast.ImportFrom) for each in code)
+    statements = [each for each in ast.walk(ast.Module(code, [])) if isinstance(each, ast.stmt)]
+    assert len(statements) - imports <= 20
+
+
+def test_the_reference_has_every_flag_setting_and_parameter(tmp_path):
+    sys.path.insert(0, str(DOCS))
+    try:
+        import reference_pages
+    finally:
+        sys.path.remove(str(DOCS))
+    reference_pages.write_pages(tmp_path)
+    pages = {path.stem: path.read_text() for path in tmp_path.iterdir()}
+    assert set(pages) == {"commands", "settings", "worlds"}
+    empty = [row for page in pages.values() for row in page.splitlines() if re.search(r"\| +\|$", row)]
+    assert empty == []  # each says what it means
+    assert all(
+        f"`--{name.replace('_', '-')}`" in pages["commands"]
+        for name in ("navigator", "steps_per_second", "goal_walk_m")
+    )
+    assert "| `tree_gaps` | Share of the horizon without trees. | share of the horizon | 0 to 0.95 |" in pages["worlds"]

@@ -73,6 +73,8 @@ def measure_walk(folder: Path) -> Values:
     at = f"{pose['x_m']},{pose['y_m']},{pose['heading_deg']}"
     tussock(folder, "view", "--seed", 9, "--at", at, "--out", "view.png")
     values["pictures"]["panorama.png"] = keep(folder / "view.png", "panorama.png")
+    tussock(folder, "play", "run", "--video", "walk.gif", "--steps-per-second", 15)
+    values["pictures"]["walk.gif"] = keep(folder / "walk.gif", "walk.gif")  # compared by its first frame
     return values
 
 

@@ -27,7 +27,7 @@ SIZE, MAP = (1280, 720), 720  # pixels: width and height of a frame, and of the 
 MARGIN, LINE = 16, 22  # pixels: around panels, and of a line of text
 INK, PAPER, GRID, CHOSEN = (30, 30, 30), (250, 250, 248), (205, 205, 205), (20, 140, 60)
 AROUND = 0.5  # m of the world around the route and the path
-GIF_WIDTH = 640  # pixels; colours of a GIF cost more than those of a video
+GIF_WIDTH, GIF_COLOURS = 640, 64  # pixels; a GIF is larger than a video
 
 
 @dataclass(frozen=True)
@@ -194,23 +194,18 @@ def _mp4(path: Path, rate: float) -> Iterator[Callable[[Frame], Any]]:
 
 @contextmanager
 def _gif(path: Path, rate: float) -> Iterator[Callable[[Frame], Any]]:
-    """Write frames as a GIF of half the size, in 64 colours."""
+    """Write frames as a GIF of half the size, in few colours."""
     from PIL import Image
 
-    frames: list[Image.Image] = []
-
-    def add(frame: Frame) -> None:
-        small = cv2.resize(frame, (GIF_WIDTH, GIF_WIDTH * SIZE[1] // SIZE[0]), interpolation=cv2.INTER_AREA)
-        frames.append(Image.fromarray(small).quantize(64, dither=Image.Dither.NONE))
-
-    yield add
-    if frames:
-        frames[0].save(
-            path,
-            format="GIF",
-            save_all=True,
-            append_images=frames[1:],
-            duration=round(1000 / rate),
-            loop=0,
-            optimize=True,
-        )
+    frames: list[Frame] = []
+    size = (GIF_WIDTH, GIF_WIDTH * SIZE[1] // SIZE[0])
+    yield lambda frame: frames.append(cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+    if not frames:
+        return
+    # The same colours in all frames, so that what stays the same costs nothing.
+    some = np.concatenate(frames[:: max(1, len(frames) // 5)])
+    colours = Image.fromarray(some).quantize(GIF_COLOURS)
+    images = [Image.fromarray(frame).quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
+    images[0].save(
+        path, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0, optimize=True
+    )
