@@ -17,7 +17,7 @@ from tussock.render.images.source import DatabaseViews
 from tussock.render.poses import Poses
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
-from tussock.world.registry import Registry
+from tussock.world.registry import Registry, suggestion
 from tussock.world.specs import signature_of
 
 from .encoding_rounding import Round
@@ -185,7 +185,7 @@ class Encoding:
             return cls.parse(text.rstrip(" |"))
         if not ("|" in name or ":" in name or OLD_NAMES.get(name, name) in STEPS):
             raise SettingError(
-                f"unknown encoding {name!r}; known: {', '.join(PRESETS)}, or a chain such as 'grey | blur 2 | resize 6'"
+                f"unknown encoding {name!r}{suggestion(name, PRESETS)}; known: {', '.join(PRESETS)}, or a chain: 'grey | resize 6'"
             )
         if resize != 1 or blur != 0:
             raise SettingError(f"encoding {name!r} is a chain in full: put resize and blur into it")

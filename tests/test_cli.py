@@ -563,6 +563,38 @@ def start(*arguments, cwd: Path) -> subprocess.Popen:
 LONG = ["run", "--world", "tiny", "--seed", "2", "--size", "720x150", "--resize", "1"]
 
 
+@pytest.mark.parametrize(
+    "command", ["run", "world", "play", "database grid", "replicate azevedo2025", "replicate thesis"]
+)
+def test_help_names_kinds_of_values_as_people_do(capfd, command):
+    _, text, _ = tussock(capfd, *command.split(), "--help")
+    assert "--out" in text or "--web" in text
+    assert "None}|" not in text
+
+
+def test_names_that_are_nearly_right_are_suggested(capfd):
+    for flag, wrong, right in (
+        ("model", "perfectmemory", "perfect-memory"),
+        ("world", "medow", "meadow"),
+        ("navigator", "laterl", "lateral"),
+    ):
+        code, _, err = tussock(capfd, "run", f"--{flag}", wrong)
+        assert code == 2
+        assert f"did you mean {right!r}?" in err.splitlines()[-1]
+
+
+def test_the_models_are_listed_without_torch():
+    script = "import sys; from tussock.navigation.cli.main import main; main(['models', '--json']); assert 'torch' not in sys.modules"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    models = json.loads(done.stdout)["models"]
+    assert set(MODELS.names) <= set(models)
+    for name in MODELS.builtin:
+        cls = MODELS.find(name)
+        assert models[name]["paper"] == cls.paper
+        assert (cls.__doc__ or "").startswith(models[name]["what"][:20])
+
+
 IGNORED = """
 import os, signal, sys, time
 from tussock.navigation.cli.interruption import check_interrupted, end_on_signals

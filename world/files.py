@@ -19,6 +19,7 @@ from .meshes.export import material_writer, meshes_of
 from .meshes.files import read_mesh
 from .meshes.reading import MeshReading
 from .params import WORLDS, check_preset, is_generated
+from .registry import suggestion
 from .route_files import existing_file, naming
 from .scene import World
 from .world_data import KEY, to_json
@@ -52,7 +53,9 @@ def check_world(name: str | os.PathLike) -> None:
     elif os.path.isdir(name):
         raise FileError(f"the world {name!r} is a folder; give the file in it")
     elif not os.path.isfile(name):
-        raise FileError(f"there is no world {name!r}; give one of {', '.join(WORLDS.names)}, or a file")
+        raise FileError(
+            f"there is no world {name!r}{suggestion(name, WORLDS.names)}; give one of {', '.join(WORLDS.names)}, or a file"
+        )
 
 
 def read_world(path: str | os.PathLike, reading: MeshReading | None = None) -> World:

@@ -1,8 +1,9 @@
 """Registries: classes and functions by name, those of tussock, of installed packages and of scripts."""
 
+import difflib
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -75,7 +76,9 @@ class Registry:
             self._registered[name] = self._import(name)
             return self._registered[name]
         hint = "import it first" if LOCATION.fullmatch(name) else "or package.module:Class"
-        raise SettingError(f"unknown {self.kind} {name!r}; known: {', '.join(self.names)}, {hint}")
+        raise SettingError(
+            f"unknown {self.kind} {name!r}{suggestion(name, self.names)}; known: {', '.join(self.names)}, {hint}"
+        )
 
     def where(self, name: str) -> str | None:
         """The `module:attribute` that a name stands for, without importing it; None for what a script registered."""
@@ -147,6 +150,12 @@ class Registry:
                 f"the {self.kind} {location!r} cannot be imported ({error}); give package.module:Class of an installed package, "
                 "or of a file in the current folder"
             ) from error
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """What to add to an error about an unknown name: the known one that it is nearly, or nothing."""
+    similar = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean {similar[0]!r}?)" if similar else ""
 
 
 def location_of(target: Any) -> str:

@@ -13,7 +13,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Union, get_args, get_type_hints
 
 import tyro
 
@@ -120,7 +120,8 @@ def commands_for(arguments: list[str]) -> dict[str, Any]:
         from .protocols import protocol_commands
 
         sentence, fixed = commands["replicate"]
-        commands["replicate"] = (sentence, fixed | protocol_commands(*arguments[1:2]))
+        protocols = protocol_commands(*arguments[1:2])
+        commands["replicate"] = (sentence, fixed | {name: _with_plain_types(each) for name, each in protocols.items()})
     return commands
 
 
@@ -129,7 +130,20 @@ def _imported(command: Any) -> Any:
     if isinstance(command, tuple):
         return command[0], {name: _imported(each) for name, each in command[1].items()}
     module, _, name = command.partition(":")
-    return getattr(import_module(f".{module}", __package__), name)
+    return _with_plain_types(getattr(import_module(f".{module}", __package__), name))
+
+
+def _with_plain_types(command: type) -> type:
+    """A command whose help says INT where a flag takes a whole number or is left out, and not {None}|INT."""
+    for name, hint in get_type_hints(command, include_extras=True).items():
+        told = [getattr(each, "metavar", None) for each in getattr(hint, "__metadata__", ())]
+        kinds = get_args(hint.__origin__ if told else hint)
+        if type(None) in kinds and not any(told):
+            metavar = "|".join(
+                "STR" if each is str else each.__name__.upper() for each in kinds if each is not type(None)
+            )
+            command.__annotations__[name] = Annotated[hint, tyro.conf.arg(metavar=metavar)]
+    return command
 
 
 def _sentence(command: Any) -> str:

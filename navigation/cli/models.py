@@ -1,6 +1,8 @@
 """The commands that train, test and run models. Heavy packages are imported where they are used."""
 
+import ast
 import dataclasses
+import importlib.util
 import math
 import time
 from dataclasses import dataclass
@@ -199,15 +201,30 @@ class ModelsCommand(Command):
     """List the familiarity models, what they do and where they come from."""
 
     def run(self) -> dict[str, Any]:
-        from ..models import MODELS, OPPONENT
-        from ..models.opponents import Opponent
+        from ..models import MODELS
 
-        classes = {name: MODELS.find(name) for name in MODELS.names} | {f"{OPPONENT}...": Opponent}
-        return {
-            "models": {
-                name: {"what": summary(cls), "paper": getattr(cls, "paper", "")} for name, cls in classes.items()
-            }
+        told = {name: described(where) for name, where in MODELS.builtin.items()}
+        others = {name: MODELS.find(name) for name in MODELS.names if name not in told}
+        told |= {
+            name: {"what": first_paragraph(cls.__doc__), "paper": getattr(cls, "paper", "")}
+            for name, cls in others.items()
         }
+        return {"models": told | {"opponent-...": described("tussock.navigation.models.opponents:Opponent")}}
+
+
+def described(where: str) -> dict[str, str]:
+    """What a class of tussock is and where it comes from; its file is read, not imported, as that takes seconds."""
+    module, _, name = where.partition(":")
+    spec = importlib.util.find_spec(module)
+    assert spec is not None
+    assert spec.origin is not None
+    body = ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body
+    (found,) = (each for each in body if isinstance(each, ast.ClassDef) and each.name == name)
+    papers = [
+        each.value.value for each in found.body
+        if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "paper" and isinstance(each.value, ast.Constant)
+    ]  # fmt: skip
+    return {"what": first_paragraph(ast.get_docstring(found)), "paper": str(papers[0]) if papers else ""}
 
 
 @dataclass
@@ -273,6 +290,6 @@ def table_by_distance(errors: "HeadingErrors") -> dict[str, dict[str, float]]:
     return {name: band.summary() for name, band in bands.items()}
 
 
-def summary(cls: type) -> str:
-    """The first paragraph of a class's documentation."""
-    return " ".join((cls.__doc__ or "").split("\n\n")[0].split()).rstrip(".")
+def first_paragraph(text: str | None) -> str:
+    """The first paragraph of a docstring, in one line."""
+    return " ".join((text or "").split("\n\n")[0].split()).rstrip(".")
