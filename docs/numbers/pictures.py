@@ -7,9 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
+import matplotlib
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 from measurement import ROOT, Measurement, Values, tussock
+
+from tussock import Pose, World, draw_panorama, draw_world, generate_route, open_renderer
+from tussock.navigation.reports.drawing import PATH_COLOUR, STYLE, save_picture
+from tussock.world.params import WORLDS
 
 ASSETS = ROOT / "assets"
 BLOCK = 16  # pixels; a picture looks different where the mean of such a block differs by more than TOLERANCE
@@ -17,6 +23,7 @@ TOLERANCE = 8  # grey levels
 TIMELINE = 40  # rows at the bottom of the viewer, whose marks depend on how quickly the recording was written
 DRAWN_AT = 58  # step of the walk at which the panorama is taken
 
+WORLD_SEED = 7
 WALK = ("--seed", 9, "--offset-m", 0.1)
 LOST = ("--offset-m", 0.1, "--learning-walk-m", 0)
 CAUSE = ("--seed", 3, "--size", "360x75", "--resize", 3, *LOST, "--scan-deg", 360)
@@ -106,6 +113,31 @@ def measure_models(folder: Path) -> Values:
     }
 
 
+def measure_worlds(folder: Path) -> Values:
+    """The figures of docs/worlds.md: each preset from above, and as an eye sees it from the middle."""
+    drawn, triangles = {}, {}
+    for name in WORLDS.builtin:
+        world = World.generate(name, seed=WORLD_SEED)
+        triangles[name] = len(world.triangles)
+        start = Pose(0.0, 0.0, 0.0) if name == "orchard" else generate_route(world, WORLD_SEED, length=2.0).start
+        with open_renderer(world) as renderer:
+            view = renderer.render([start])[0]
+        with matplotlib.rc_context(STYLE):
+            figure = Figure(figsize=(8, 8.6), layout="constrained")
+            above, seen = figure.subplots(2, height_ratios=[3, 1])
+            draw_world(above, world)
+            above.plot(start.x, start.y, "o", color=PATH_COLOUR, ms=6, mec="white")
+            draw_panorama(seen, view)
+            save_picture(figure, folder / f"{name}.png")
+        drawn[f"worlds/{name}.png"] = keep(folder / f"{name}.png", f"worlds/{name}.png")
+    return {"triangles": triangles, "pictures": drawn}
+
+
+def triangles_of(name: str) -> Callable[[Values], str]:
+    """How many triangles a world has."""
+    return lambda values: f"{values['triangles'][name]:,}"
+
+
 def centimetres(name: str) -> Callable[[Values], str]:
     """A distance as it is printed."""
     return lambda values: f"{100 * values[name]:.1f} cm"
@@ -138,6 +170,9 @@ MEASUREMENTS: dict[str, Measurement] = {
             "poor": lambda values: str(sum(values["causes"].values())),
             "off": lambda values: str(values["causes"]["off the catchment"]),
         },
+    ),
+    "worlds": Measurement(
+        f"the presets with seed {WORLD_SEED}", measure_worlds, {name: triangles_of(name) for name in WORLDS.builtin}
     ),
     "figures": Measurement(
         "`python docs/draw_models.py`",
