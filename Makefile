@@ -24,7 +24,7 @@ test: $(VENV)/developer  ## the quick tests, on all cores
 test-slow: $(VENV)/developer  ## the tests that take long: killed processes, full disks, whole studies, browsers
 	$(BIN)/pytest -n auto -m slow
 
-docs: $(VENV)/documenter  ## the documentation site, into docs/_build; needs no network; a broken link or page fails
+docs: $(VENV)/developer  ## the documentation site, into docs/_build; needs no network; a broken link or page fails
 	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -b html docs docs/_build
 	@echo "The documentation is in docs/_build/index.html"
 
@@ -60,10 +60,6 @@ $(VENV)/installed: pyproject.toml constraints.txt
 $(VENV)/developer: $(VENV)/installed
 	$(PIP) -e '.[dev]'
 	mkdir -p $(VENV)/clone && ln -sfn ../.. $(VENV)/clone/tussock  # where pyright finds the package
-	touch $@
-
-$(VENV)/documenter: $(VENV)/installed
-	$(PIP) -e '.[docs]'
 	touch $@
 
 clean:

@@ -14,7 +14,7 @@ WIDTHS = (390, 1400)  # of a telephone and of a desk, in pixels
 
 PROBE = """<script>addEventListener("load", () => {
   const wide = [...document.querySelectorAll("body *")].filter(e => e.getBoundingClientRect().right > innerWidth + 1
-    && !e.closest(".wide, pre")).map(e => e.tagName + "." + e.className);
+    && !e.closest(".wide, pre, .table-wrapper, .toc-drawer")).map(e => e.tagName + "." + e.className);
   const broken = [...document.images].filter(i => !i.complete || i.naturalWidth == 0).length;
   const small = [...document.querySelectorAll("p, td, th, figcaption, pre")]
     .filter(e => parseFloat(getComputedStyle(e).fontSize) < 11).length;
