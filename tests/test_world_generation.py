@@ -351,7 +351,7 @@ def test_a_registered_preset_is_generated_by_name(monkeypatch):
 
 def test_the_public_names_are_listed_and_each_loads():
     names = {"World", "Pose", "Route", "Bounds", "Ground", "WorldParams", "open_world", "read_world", "write_world"}
-    names |= {"read_route", "write_route", "generate_route", "MeshReading"}
+    names |= {"read_route", "write_route", "generate_route", "MeshReading", "column_azimuths", "turn_of_columns"}
     names |= {"InputError", "SettingError", "FileError", "DiskFullError", "MissingDependencyError"}
     assert set(dir(world_package)) == set(world_package.__all__) == names
     for name in names:

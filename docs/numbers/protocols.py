@@ -223,22 +223,34 @@ def completed(values: Values) -> str:
     return ", ".join(f"{row['input']} {row['completed walks']:.0f} of {row['walks']:.0f}" for row in rows)
 
 
+def strategies(values: Values) -> str:
+    """Mean displacements of each strategy, and their differences from view-based orientation."""
+    every = table(values, "differences")
+    every = every[every["starts"] == "all starts"]
+    numbers, rows = values["numbers"], []
+    for name in table(values, "by_start")["strategy"].unique():
+        cells = [name]
+        for measure in every["measure"].unique():
+            cells.append(number(numbers[f"{measure}, {name}"]))
+            found = every[(every["measure"] == measure) & (every["strategy"] == name)]
+            cells.append("-" if found.empty else _difference(found.iloc[0]))
+        rows.append(cells)
+    less = "less view-based (95 % interval)"
+    return markdown(["strategy", "mean displacement (m)", less, "over the last 5 % (m)", less], rows)
+
+
+def _difference(row: pd.Series) -> str:
+    p = "under 0.001" if row["p (Holm)"] < 0.001 else f"{row['p (Holm)']:.3f}"
+    return f"{with_interval(row.iloc[4], row['low'], row['high'])}, p {p}"
+
+
 def by_distance(values: Values) -> str:
-    """What became of walks by the distance of their start from the route."""
-    rows = []
+    """Mean displacement of each strategy by the distance of the start from the route."""
     by_start = table(values, "by_start")
-    for _, row in by_start[by_start["start beside the route (m)"].isin((0, 0.25, 0.5, 1, 2, 3, 4, 5, 5.5))].iterrows():
-        share = f"{100 * row['got to the last 5 %']:.0f} %"
-        numbers = (number(row[f"mean displacement{part} (m)"]) for part in ("", ", last 5 %"))
-        rows.append([f"{row['start beside the route (m)']:g}", f"{row['walks']:.0f}", *numbers, share])
-    columns = [
-        "start beside the route (m)",
-        "walks",
-        "mean displacement (m)",
-        "over the last 5 % (m)",
-        "got to the last 5 %",
-    ]
-    return markdown(columns, rows)
+    start, shown = "start beside the route (m)", (0, 0.25, 0.5, 1, 2, 3, 4, 5, 5.5)
+    some = by_start[by_start[start].isin(shown)].pivot_table("mean displacement (m)", "strategy", start, sort=False)
+    rows = [[name, *map(number, row)] for name, row in zip(some.index, some.to_numpy(), strict=True)]
+    return markdown(["mean displacement (m), start beside the route", *(f"{each:g} m" for each in some.columns)], rows)
 
 
 def distances_by_gain(values: Values) -> str:
@@ -279,6 +291,7 @@ def in_a_line(values: Values) -> str:
     return "; ".join(parts)
 
 
+AZEVEDO_WORLDS = 30  # of 75
 SUSSEX_WORLD = "--world S/world5000_gray.bin --route S"
 FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables that are kept, texts
     "ardin2016": ("ardin2016", ["by_displacement"], {"errors": errors_by_start}),
@@ -302,6 +315,11 @@ FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables 
         "lemoel2020",
         ["gains", "release"],
         {"gains": distances_by_gain, "release": distances_by_memory},
+    ),
+    "azevedo2025": (
+        f"azevedo2025 --worlds {AZEVEDO_WORLDS}",
+        ["by_start", "differences"],
+        {"strategies": strategies, "by-distance": by_distance},
     ),
     "beenav2026": ("beenav2026", ["by_distance"], {"shares": shares_by_release}),
 }
