@@ -107,7 +107,7 @@ def recorded(agent, tmp_path_factory):
     path = tmp_path_factory.mktemp("run") / "recording.rrd"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(log, "FLUSH_SECONDS", 0.0)
-        return path, record(path, agent, training_poses=agent.trained.poses, title="a walk")
+        return path, record(path, agent, training_poses=agent.trained.poses, about="a walk")
 
 
 @pytest.fixture

@@ -36,6 +36,7 @@ ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 
 VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
 FLUSH_SECONDS = 0.5  # how often steps are brought to disk; a crash may lose those of twice as long
 BATCH = 32  # steps whose views are sent at once: fresh memory for more of them takes longer than copying them
+SCALE_COLOUR, SCALE_BELOW = (255, 255, 255), 0.4  # of the line of a metre, and how far below the route it is (m)
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
 
 
@@ -54,7 +55,7 @@ class Recording:
         training_poses: Float[np.ndarray, "n 3"] | None = None,
         max_deviation: float = 0.5,
         live: str | None = None,
-        title: str = "",
+        about: str = "",
     ):
         """Begin a recording.
 
@@ -65,7 +66,7 @@ class Recording:
             training_poses: (n, 3) Of the views that were learned; None: they are not shown.
             max_deviation: Deviation to which its plot reaches (m).
             live: Address of a running viewer to stream to as well.
-            title: Shown with the recording; markdown.
+            about: What the walk is, in Markdown; see `describe`.
         """
         self._path, self._renderer, self._training_poses = path, renderer, training_poses
         self._new: list[tuple[Step, Diagnosis | None]] = []  # steps that the thread has not got yet,
@@ -82,7 +83,8 @@ class Recording:
             check_viewer(live)
             self._streams.append(rr.RecordingStream("tussock"))
             self._streams[1].connect_grpc(live, default_blueprint=layout)
-        self._log_surroundings(renderer.world, route, title)
+        self._log_surroundings(renderer.world, route)
+        self.describe(about)
         self._thread = ThreadPoolExecutor(1, "recording")
         self._writing = self._thread.submit(self._flush)
         self._flushed = time.monotonic()
@@ -98,6 +100,11 @@ class Recording:
             self._hand_over(flush=self._is_due())
         if self._is_due():  # where FLUSH_SECONDS is 0, each step is on disk before the next
             self._writing.result()
+
+    def describe(self, about: str) -> None:
+        """Show what the walk is, in Markdown, in place of what was shown before."""
+        if about:
+            self._log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
 
     def close(self) -> None:
         """Write what is left and close the file. Raises DiskFullError where it cannot be written."""
@@ -166,7 +173,7 @@ class Recording:
                 warnings.warn(f"the live viewer is gone ({error}); the walk goes on without it", stacklevel=2)
                 self._streams.remove(viewer)
 
-    def _log_surroundings(self, world: World, route: Route, title: str) -> None:
+    def _log_surroundings(self, world: World, route: Route) -> None:
         """What does not change: the world, the route, where views were learned, the names of curves."""
         self._log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         triangles, rgb = world.surfaces()
@@ -181,6 +188,8 @@ class Recording:
             self._log("world/views", rr.Points3D(points, colors=VIEW_COLOUR, radii=0.004), static=True)
         line = self._above(route.xy)
         goal = line[-1:]
+        metre = self._above(route.xy.min(axis=0) + np.array([[0.0, -SCALE_BELOW], [1.0, -SCALE_BELOW]]))
+        self._log("world/scale", rr.LineStrips3D([metre], colors=SCALE_COLOUR, radii=0.012, labels="1 m"), static=True)
         self._log("world/route", rr.LineStrips3D([line], colors=ROUTE_COLOUR, radii=0.008), static=True)
         self._log("world/goal", rr.Points3D(goal, colors=ROUTE_COLOUR, radii=0.06), static=True)
         if self._training_poses is not None:
@@ -191,13 +200,12 @@ class Recording:
             self._log(entity, rr.SeriesLines(names=name, colors=colour), static=True)
         for entity, colour in MARKS.items():
             self._log(entity, rr.Points3D.from_fields(colors=colour, radii=0.03), static=True)
-        if title:
-            self._log("about", rr.TextDocument(title, media_type="text/markdown"), static=True)
 
     def _log_constants(self, step: Step) -> None:
         """What stays the same from step to step."""
         self._log("world/agent", rr.Arrows3D.from_fields(colors=PATH_COLOUR, radii=0.012), static=True)
         self._log("world/path", rr.LineStrips3D.from_fields(colors=PATH_COLOUR, radii=0.008), static=True)
+        self._log("world/start", rr.Points3D([_place(step)], colors=PATH_COLOUR, radii=0.04), static=True)
         eye = self._renderer.eye
         pixels = rr.Image.from_fields(format=image_format(eye.width, eye.height))
         self._log("view", pixels, static=True)

@@ -81,10 +81,10 @@ def _draw(trained: TrainedNavigator, trajectory: Trajectory, summary: dict[str, 
     from ..reports.maps import write_overview
 
     renderer = trained.renderer
-    deviation = f"{summary['mean_deviation_m']:.3f} m off the route on average"
-    title = f"{summary['reason']} after {summary['steps']} steps, {deviation}"
     views = renderer.poses[:, :2] if isinstance(renderer, DatabaseViews) else None
-    write_overview(renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, views=views, title=title)
+    write_overview(
+        renderer.world, out / PICTURE, route=trained.route, walk=trajectory.xy, views=views, title=_result(summary)
+    )
 
 
 def _record(
@@ -107,18 +107,31 @@ def _record(
         training_poses=trained.poses,
         max_deviation=experiment.stopping.max_deviation,
         live=viewer,
-        title="\n".join(
-            f"- **{key.replace('_', ' ')}**: {value}" for key, value in settings.items() if value is not None
-        ),
+        about=_about(settings),
     ) as recording:
         try:
             for step, diagnosis in experiment.steps(trained):
                 recording.log(step, diagnosis)
                 trajectory.add(step, diagnosis)
                 walking(step.index, limit)
+            recording.describe(_about(settings, result=_result(trajectory.summary())))
         finally:
             trajectory.write(out / TRAJECTORY)
     return trajectory, time.perf_counter() - began
+
+
+def _about(settings: dict[str, Any], result: str = "") -> str:
+    """What a recording says of its walk, as Markdown: the result, then what it is a result of, then all other settings."""
+    first = {name: settings[name] for name in ("model", "navigator", "encoding", "world", "seed")}
+    lines = [
+        f"- **{name.replace('_', ' ')}**: {value}" for name, value in (first | settings).items() if value is not None
+    ]
+    return "\n".join(([f"**{result}**", ""] if result else []) + lines)
+
+
+def _result(summary: dict[str, Any]) -> str:
+    """The end of a walk in a line."""
+    return f"{summary['reason']} after {summary['steps']} steps, {summary['mean_deviation_m']:.3f} m off the route on average"
 
 
 def _settings(experiment: Experiment, trained: TrainedNavigator) -> dict[str, Any]:
