@@ -28,7 +28,7 @@ from ..walker import Step
 from . import disk
 from .blueprint import MARKS, OF_A_SCAN, TIMELINE, Shown, blueprint, image_format
 from .columns import bar_chart_columns, image_columns
-from .marks import Marks, events_of
+from .marks import Marks, ends_of_scale, events_of, scale
 from .signals import SignalLog
 from .viewer import check_viewer
 
@@ -36,7 +36,6 @@ ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 
 VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
 FLUSH_SECONDS = 0.5  # how often steps are brought to disk; a crash may lose those of twice as long
 BATCH = 32  # steps whose views are sent at once: fresh memory for more of them takes longer than copying them
-SCALE_COLOUR, SCALE_BELOW = (255, 255, 255), 0.4  # of the line of a metre, and how far below the route it is (m)
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
 
 
@@ -188,8 +187,7 @@ class Recording:
             self._log("world/views", rr.Points3D(points, colors=VIEW_COLOUR, radii=0.004), static=True)
         line = self._above(route.xy)
         goal = line[-1:]
-        metre = self._above(route.xy.min(axis=0) + np.array([[0.0, -SCALE_BELOW], [1.0, -SCALE_BELOW]]))
-        self._log("world/scale", rr.LineStrips3D([metre], colors=SCALE_COLOUR, radii=0.012, labels="1 m"), static=True)
+        self._log("world/scale", scale(self._above(ends_of_scale(route))), static=True)
         self._log("world/route", rr.LineStrips3D([line], colors=ROUTE_COLOUR, radii=0.008), static=True)
         self._log("world/goal", rr.Points3D(goal, colors=ROUTE_COLOUR, radii=0.06), static=True)
         if self._training_poses is not None:

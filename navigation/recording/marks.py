@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import rerun as rr
+from jaxtyping import Float
 
-from tussock.world.geometry import Pose
+from tussock.world.geometry import Pose, Route
 
 from ..failures import Cause, Diagnosis
 from ..walker import Step
@@ -13,6 +14,7 @@ from .blueprint import CARRIED, TOUCHED, cause_entity
 from .signals import Send
 
 MARKS_ABOVE = 0.04  # m; marks are drawn this high above the ground, and above all lines
+SCALE_COLOUR, SCALE_BELOW = (255, 255, 255), 0.1  # of the line of a metre, and how far south of the route it is (m)
 LABEL_SPACING = 0.6  # m; marks of one cause nearer than this to the one with its name have none
 
 
@@ -66,3 +68,14 @@ def events_of(step: Step, diagnosis: Diagnosis | None, *, touching: bool) -> Ite
         yield ended
     if diagnosis is not None:
         yield str(diagnosis)
+
+
+def ends_of_scale(route: Route) -> Float[np.ndarray, "2 2"]:
+    """The ends of a line of a metre at the south-eastern corner of a route (m)."""
+    east, south = route.xy[:, 0].max(), route.xy[:, 1].min() - SCALE_BELOW
+    return np.array([[east - 1.0, south], [east, south]])
+
+
+def scale(ends: Float[np.ndarray, "2 3"]) -> rr.LineStrips3D:
+    """A line between places, labelled as a metre."""
+    return rr.LineStrips3D([ends], colors=SCALE_COLOUR, radii=0.008, labels="1 m", show_labels=True)
