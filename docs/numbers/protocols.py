@@ -235,8 +235,8 @@ def strategies(values: Values) -> str:
             found = every[(every["measure"] == measure) & (every["strategy"] == name)]
             cells.append("-" if found.empty else _difference(found.iloc[0]))
         rows.append(cells)
-    less = "less view-based (95 % interval)"
-    return markdown(["strategy", "mean displacement (m)", less, "over the last 5 % (m)", less], rows)
+    columns = [cell for measure in every["measure"].unique() for cell in (measure, "less view-based (95 % interval)")]
+    return markdown(["strategy", *columns], rows)
 
 
 def _difference(row: pd.Series) -> str:
