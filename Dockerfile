@@ -1,4 +1,4 @@
-# tussock with all its renderers: docker build -t tussock . && docker run --rm -v "$PWD/out:/out" tussock run --world tiny --out /out/run
+# tussock with all its renderers: docker build -t tussock . && mkdir -m 777 -p out && docker run --rm -v "$PWD/out:/out" tussock run --world tiny --out /out/run
 FROM python:3.11-slim-bookworm
 # hadolint ignore=DL3008 (versions of Debian's packages are those of its release)
 RUN apt-get update \

@@ -7,10 +7,11 @@ from PIL import Image
 
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.recording.film import SIZE, Film, save_film
+from tussock.navigation.recording.playback import play
 from tussock.navigation.recording.recorded_walk import read_walk
 from tussock.navigation.recording.run_folder import record_run
 from tussock.render.eye import Eye
-from tussock.world.errors import FileError, MissingDependencyError
+from tussock.world.errors import FileError, MissingDependencyError, SettingError
 
 
 def experiment(navigator: str) -> Experiment:
@@ -78,12 +79,29 @@ def test_the_path_grows_from_frame_to_frame(run):
     assert red[1] > red[0] > 0
 
 
+def test_no_line_is_drawn_where_the_agent_was_carried(tmp_path):
+    carried = experiment("scan").replace(displacement__left=0.3, displacement__at=0.5)
+    record_run(carried, tmp_path / "run")
+    read = read_walk(tmp_path / "run" / "recording.rrd")
+    moved = [k for k, displaced in enumerate(carried.run().column("displaced")) if displaced]
+    assert np.flatnonzero(~read.walked).tolist() == [0, *moved]
+    assert Film.of(read).turn(moved[0]) is None
+
+
+def test_a_very_flat_eye_is_filmed(tmp_path):
+    flat = experiment("scan").replace(eye=Eye(width=1440, height=1), encoding="grey | resize 20", route_length=0.5)
+    record_run(flat, tmp_path / "run")
+    save_film(tmp_path / "run" / "recording.rrd", tmp_path / "walk.gif")
+
+
 def test_wrong_names_and_files_are_refused(run, tmp_path, monkeypatch):
     recording = run[0] / "recording.rrd"
     with pytest.raises(FileError, match=r"\.mp4 or \.gif"):
         save_film(recording, tmp_path / "walk.avi")
-    with pytest.raises(FileError, match="speed"):
+    with pytest.raises(SettingError, match="speed"):
         save_film(recording, tmp_path / "walk.gif", steps_per_second=0)
+    with pytest.raises(SettingError, match="one of them"):
+        play(run[0], web=True, video=tmp_path / "walk.gif")
     (tmp_path / "other.rrd").write_bytes(b"no recording")
     with pytest.raises(FileError, match=r"other\.rrd is no recording"):
         save_film(tmp_path / "other.rrd", tmp_path / "walk.gif")

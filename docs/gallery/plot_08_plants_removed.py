@@ -2,7 +2,7 @@
 Plants removed
 ==============
 
-The route is learned, then a third of all triangles near it is taken away: does the agent still find home?
+The route is learned, then 30 and 60 % of all triangles of the world are taken away: does the agent still find home?
 """
 
 import dataclasses

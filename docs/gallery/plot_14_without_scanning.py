@@ -2,7 +2,7 @@
 Steering without scanning
 =========================
 
-A scan looks in a hundred directions at each step. The navigator ``lateral`` looks in one: two memories, of views to the left and to the
+A scan looks in sixty directions at each step. The navigator ``lateral`` looks in one: two memories, of views to the left and to the
 right of the way, are compared, and their difference steers.
 """
 

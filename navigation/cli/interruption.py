@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command wherever it is, also where a library ignores what is raised."""
+"""Ctrl-C and SIGTERM end a command wherever it is; where a library ignores what is raised, when it next reports its progress."""
 
 import signal
 

@@ -273,6 +273,8 @@ class PlayCommand(Command):
     def run(self) -> dict[str, Any]:
         from ..recording.playback import play
 
+        if self.video is None:
+            return play(self.run_folder, web=self.web, screenshot=self.screenshot)
         with progress("drawing", "steps") as report:
             return play(
                 self.run_folder,

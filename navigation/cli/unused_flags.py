@@ -19,8 +19,9 @@ _NEEDED = {
     "goal_views": "goal_walk_m",
     "goal_spread_deg": "goal_walk_m",
     "waypoint_m": "on_lost",
+    "put_back_ahead_m": "on_lost",
 }
-_OF_THE_ROUTE = ("spacing_m", "every", "parallel_views")  # what --goal-only makes useless
+_OF_THE_ROUTE = ("spacing_m", "every", "parallel_views", "learning_walk_m")  # what --goal-only makes useless
 
 
 def warn_of_unused_flags(experiment: Experiment) -> None:
@@ -43,7 +44,9 @@ def unused_flags(experiment: Experiment) -> dict[str, str]:
     navigator, name = experiment.navigator, str(experiment.navigator)
     if "model" in given and not takes(navigator.target, "model"):
         unused["model"] = f"with the navigator {name!r}, which takes no model"
-    if "senses" in given and not getattr(navigator.make(model=RandomHeadings()), "reads_senses", True):
+    if "senses" in given and not getattr(
+        navigator.make(model=RandomHeadings(), seed=experiment.seed), "reads_senses", True
+    ):
         unused["senses"] = f"with the navigator {name!r}, which reads neither compass nor odometer"
     return {_flag(name): reason for name, reason in unused.items()}
 

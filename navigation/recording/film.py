@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from tussock.world.atomic import replacing
-from tussock.world.errors import FileError, MissingDependencyError
+from tussock.world.errors import FileError, MissingDependencyError, SettingError, first_line
 from tussock.world.progress import Progress, no_progress
 
 from .log import PATH_COLOUR, ROUTE_COLOUR
@@ -77,7 +77,8 @@ class Film:
         map_ = image[:, :MAP]
         map_[:] = self.ground
         path = self._pixels(walk.places[: number + 1])
-        cv2.polylines(map_, [path], False, PATH_COLOUR, 3, cv2.LINE_AA, 4)
+        ways = np.split(path, np.flatnonzero(~walk.walked[: number + 1])[1:])
+        cv2.polylines(map_, ways, False, PATH_COLOUR, 3, cv2.LINE_AA, 4)
         cv2.circle(map_, tuple(path[0] // 16), 6, PATH_COLOUR, -1, cv2.LINE_AA)
         ends = self._pixels(
             np.stack([walk.places[number], walk.places[number] + walk.facing[number] * 34 / self.scale])
@@ -88,7 +89,7 @@ class Film:
         y += LINE
         if step in walk.views:
             view = walk.views[step]
-            tall = min(round(wide * view.shape[0] / view.shape[1]), 200)
+            tall = min(max(1, round(wide * view.shape[0] / view.shape[1])), 200)
             _write(image, "what the agent sees: left, ahead, right", (left, y))
             y += 8
             image[y : y + tall, left : left + wide] = cv2.resize(view, (wide, tall), interpolation=cv2.INTER_AREA)
@@ -120,8 +121,8 @@ class Film:
             cv2.line(panel, (at, 0), (at, tall - LINE), CHOSEN, 2)
 
     def turn(self, number: int) -> float | None:
-        """Degrees to the right by which the agent turned at a step; None at the first, of which the heading before is not recorded."""
-        if number == 0:
+        """Degrees to the right by which the agent turned at a step; None where it did not walk there, as the heading before is unknown."""
+        if not self.walk.walked[number]:
             return None
         before, now = (complex(*self.walk.facing[k]) for k in (number - 1, number))
         return -float(np.degrees(np.angle(now / before)))
@@ -154,21 +155,22 @@ def save_film(recording: Path, film: Path, *, steps_per_second: float = 10.0, pr
         The number of frames.
 
     Raises:
-        FileError: For another kind of file, or a recording without a walk.
+        FileError: For another kind of file, a recording without a walk, or a film that could not be written.
+        SettingError: For another speed.
         MissingDependencyError: Where imageio-ffmpeg is needed, and missing.
     """
     writers = {".mp4": _mp4, ".gif": _gif}
     if film.suffix.lower() not in writers:
         raise FileError(f"{film}: a film is written as .mp4 or .gif")
-    if not 0 < steps_per_second <= 100:
-        raise FileError(f"{steps_per_second:g} steps a second: give a speed over 0 and up to 100")
+    if not 0.1 <= steps_per_second <= 100:
+        raise SettingError(f"--steps-per-second {steps_per_second:g}: give a speed from 0.1 to 100")
     walk = read_walk(recording)
     drawn = Film.of(walk)
     with replacing(film) as partial, writers[film.suffix.lower()](partial, steps_per_second) as add:
         for number in range(len(walk.steps)):
             add(drawn.frame(number))
             progress(number + 1, len(walk.steps))
-        for _ in range(round(steps_per_second)):  # the end stays for a second
+        for _ in range(max(1, round(steps_per_second))):  # the end stays for a second
             add(drawn.frame(len(walk.steps) - 1))
     return len(walk.steps)
 
@@ -185,9 +187,15 @@ def _mp4(path: Path, rate: float) -> Iterator[Callable[[Frame], Any]]:
     options: dict[str, Any] = {"fps": rate, "codec": "libx264", "quality": None, "bitrate": "0"}
     options["output_params"] = ["-crf", "28", "-preset", "slow", "-movflags", "+faststart"]
     writer = imageio_ffmpeg.write_frames(os.fspath(path), SIZE, **options)
-    writer.send(None)
+    sent: list[int] = []
     try:
-        yield lambda frame: writer.send(np.ascontiguousarray(frame))
+        writer.send(None)
+        yield lambda frame: (writer.send(np.ascontiguousarray(frame)), sent.append(1))
+        writer.close()
+        if imageio_ffmpeg.count_frames_and_secs(os.fspath(path))[0] != len(sent):  # it does not say when it fails
+            raise FileError(f"{path} could not be written in full; is there room on its disk?")
+    except (RuntimeError, OSError) as error:
+        raise FileError(f"ffmpeg could not write the film ({first_line(error)}); write a .gif instead") from error
     finally:
         writer.close()
 
@@ -207,5 +215,11 @@ def _gif(path: Path, rate: float) -> Iterator[Callable[[Frame], Any]]:
     colours = Image.fromarray(some).quantize(GIF_COLOURS)
     images = [Image.fromarray(frame).quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
     images[0].save(
-        path, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0, optimize=True
+        path,
+        format="GIF",
+        save_all=True,
+        append_images=images[1:],
+        duration=10 * max(1, round(100 / rate)),
+        loop=0,
+        optimize=True,
     )

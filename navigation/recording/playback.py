@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tussock.world.errors import FileError, MissingDependencyError
+from tussock.world.errors import FileError, MissingDependencyError, SettingError
 from tussock.world.progress import Progress, no_progress
 
 from .viewer import save_screenshot, watch
@@ -38,8 +38,11 @@ def play(
 
     Raises:
         FileError: Where there is no recording.
-        MissingDependencyError: Where there is no display, and neither `web` nor `screenshot`.
+        SettingError: For more than one of `web`, `screenshot` and `video`.
+        MissingDependencyError: Where there is no display, and none of these; and for an .mp4 without imageio-ffmpeg.
     """
+    if web + (screenshot is not None) + (video is not None) > 1:
+        raise SettingError("--web, --screenshot and --video each take the place of the others: give one of them")
     recording = run / RECORDING if run.is_dir() else run
     if not recording.is_file():
         raise FileError(f"there is no recording {recording}; give the folder of a run")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from tussock.world.errors import FileError, first_line
 
@@ -21,6 +21,7 @@ class RecordedWalk:
         places: (n, 2) Where the agent looked (m).
         facing: (n, 2) Unit vectors to where it turned then.
         deviations: (n,) Distance from the route (m).
+        walked: (n,) Whether it walked there from the step before; not at the first step, and where it was carried or put back.
         views: What it saw, by the number of the step.
         familiarity: Of the headings that it compared, from left to right, by the number of the step.
         degrees: (rotations,) Of these headings to the right of where it faced; empty where it does not scan.
@@ -33,6 +34,7 @@ class RecordedWalk:
     places: Float[np.ndarray, "n 2"]
     facing: Float[np.ndarray, "n 2"]
     deviations: Float[np.ndarray, " n"]
+    walked: Bool[np.ndarray, " n"]
     views: dict[int, UInt8[np.ndarray, "h w 3"]]
     familiarity: dict[int, Float[np.ndarray, " rotations"]]
     degrees: Float[np.ndarray, " rotations"]
@@ -45,7 +47,10 @@ def read_walk(recording: Path) -> RecordedWalk:
     """Read what a film shows. Raises FileError for a file that is no recording of a walk."""
     try:
         timed, constant = _contents(recording)
-        steps = np.array(sorted(timed["/world/agent:Arrows3D:origins"]))
+        # Of a walk that was killed, the last steps may not have all columns.
+        steps = np.array(
+            sorted(timed["/world/agent:Arrows3D:origins"].keys() & timed["/deviation/m:Scalars:scalars"].keys())
+        )
         format_ = constant["/view:Image:format"][0]
         shape = (format_["height"].as_py(), format_["width"].as_py(), 3)
     except (KeyError, ValueError, RuntimeError, OSError) as error:
@@ -57,7 +62,9 @@ def read_walk(recording: Path) -> RecordedWalk:
         return np.array([_numbers(timed[name][k])[:columns] for k in steps.tolist()], dtype=float)
 
     facing = rows("/world/agent:Arrows3D:vectors", 2)
-    charts = timed.get("/familiarity:BarChart:values", {})
+    degrees = constant.get("/familiarity:BarChart:abscissa")
+    charts = {} if degrees is None else timed.get("/familiarity:BarChart:values", {})
+    path = timed.get("/world/path:LineStrips3D:strips", {})
     triangles, rgb = _mesh(constant)
     return RecordedWalk(
         steps=steps,
@@ -66,7 +73,8 @@ def read_walk(recording: Path) -> RecordedWalk:
         deviations=rows("/deviation/m:Scalars:scalars", 1)[:, 0],
         views={k: _numbers(pixels).reshape(shape) for k, pixels in timed.get("/view:Image:buffer", {}).items()},
         familiarity={k: _chart(values) for k, values in charts.items()},
-        degrees=_chart(constant["/familiarity:BarChart:abscissa"]) if charts else np.empty(0),
+        degrees=_chart(degrees) if charts else np.empty(0),
+        walked=np.array([k in path for k in steps.tolist()]),
         route=_numbers(constant["/world/route:LineStrips3D:strips"]).reshape(-1, 3)[:, :2],
         triangles=triangles,
         rgb=rgb,
