@@ -626,7 +626,10 @@ def test_ctrl_c_while_learning_leaves_the_earlier_run(capfd, tmp_path):
         assert running.stderr is not None
         assert running.stderr.readline() == "renderer: cpu\n"  # it is learning
         running.send_signal(signal.SIGINT)
-        _, err = running.communicate()
+        try:
+            _, err = running.communicate(timeout=120)
+        finally:
+            running.kill()  # where it hangs
     assert running.returncode == 130
     assert err.splitlines()[-1] == "tussock: interrupted"
     assert contents(tmp_path / "run") == before

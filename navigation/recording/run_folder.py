@@ -2,9 +2,9 @@
 
 import json
 import os
+import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -59,9 +59,10 @@ def record_run(
     given = (experiment.world, experiment.route, experiment.route_database, experiment.grid_database)
     files = [Path(each) for each in given if isinstance(each, str | Path)]
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
-    thread = ThreadPoolExecutor(1)  # imports what is needed only later while the world is made and views are drawn
-    thread.map(import_module, IMPORTED_LATER)
-    with thread, experiment.opened(learning) as trained:
+    # What is needed only later is imported while the world is made and views are drawn. Nothing waits for this thread: Ctrl-C within an
+    # import here may leave a lock of Python's that it would wait for, for ever.
+    threading.Thread(target=lambda: list(map(import_module, IMPORTED_LATER)), daemon=True).start()
+    with experiment.opened(learning) as trained:
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
         settings = _settings(experiment, trained)
         trajectory, seconds = _record(experiment, trained, out, viewer, settings, walking)
