@@ -5,6 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,7 @@ def record_run(
     check_run_folder(out, overwrite=overwrite, inputs=files, viewer=viewer)
     # What is needed only later is imported while the world is made and views are drawn. Nothing waits for this thread: Ctrl-C within an
     # import here may leave a lock of Python's that it would wait for, for ever.
-    threading.Thread(target=lambda: list(map(import_module, IMPORTED_LATER)), daemon=True).start()
+    threading.Thread(target=_import_all, daemon=True).start()
     with experiment.opened(learning) as trained:
         _claim(out, overwrite, run_command(experiment, str(out)) + " --overwrite")
         settings = _settings(experiment, trained)
@@ -119,6 +120,13 @@ def _record(
         finally:
             trajectory.write(out / TRAJECTORY)
     return trajectory, time.perf_counter() - began
+
+
+def _import_all() -> None:
+    """Import what is needed only later; what cannot be imported is reported where it is needed."""
+    with suppress(Exception):
+        for name in IMPORTED_LATER:
+            import_module(name)
 
 
 def _about(settings: dict[str, Any], result: str = "") -> str:
