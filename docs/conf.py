@@ -21,10 +21,8 @@ extensions = [
     "public_api",  # of this folder
 ]
 exclude_patterns = ["_build", "numbers", "gallery"]
-nitpicky = False  # annotations name shapes, which are no references; broken links in pages are warnings all the same
 
 # Markdown: pages are read on GitHub as well, so links are to files.
-myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 suppress_warnings = ["myst.header"]  # some pages begin a section two levels below the last
 
@@ -44,16 +42,11 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "capture_repr": (),
     "write_computation_times": False,  # that page would ask other sites for its style
-    "min_reported_time": 60,
-    "remove_config_comments": True,
     "abort_on_example_error": True,
-    "matplotlib_animations": False,
 }
 
 html_theme = "furo"
 html_title = f"tussock {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_theme_options = {"navigation_with_keys": True}
 html_show_sphinx = False
-templates_path = []

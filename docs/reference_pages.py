@@ -3,16 +3,14 @@
 A Sphinx extension: it writes them into docs/reference before Sphinx reads the pages.
 """
 
-import ast
 import dataclasses
 import inspect
-import itertools
 import re
-import textwrap
 from collections.abc import Iterable
-from functools import cache
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
+
+import docstring_parser
 
 from tussock.navigation.cli.main import COMMANDS, commands_for
 from tussock.navigation.cli.options import RunOptions
@@ -68,8 +66,8 @@ def _command(name: str, command: type, level: str) -> list[str]:
 
 
 def _flag(field: dataclasses.Field) -> str:
-    positional = "Positional" in str(field.type)
-    return f"`{field.name.upper() if positional else '--' + field.name.replace('_', '-')}`"
+    metavars = [each.metavar for each in _notes(field.type) if getattr(each, "metavar", None)]
+    return f"`{metavars[0] if 'Positional' in str(field.type) else '--' + field.name.replace('_', '-')}`"
 
 
 def _default(field: dataclasses.Field) -> str:
@@ -99,27 +97,17 @@ def _notes(hint: Any) -> Iterable[Any]:
             yield from _notes(each)
 
 
-@cache
 def _texts(cls: type) -> dict[str, str]:
     """The text below each field of a class."""
-    if not dataclasses.is_dataclass(cls):
-        return {}
     try:
-        source = textwrap.dedent(inspect.getsource(cls))
-    except (OSError, TypeError):  # it was made while the program ran
+        return _descriptions(docstring_parser.parse_from_object(cls))
+    except (OSError, TypeError):  # the class was made while the program ran, or is Python's own
         return {}
-    (body,) = [each.body for each in ast.parse(source).body if isinstance(each, ast.ClassDef)]
-    return {
-        field.target.id: " ".join(inspect.cleandoc(text.value.value).split())
-        for field, text in itertools.pairwise(body)
-        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-        and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)
-    }  # fmt: skip
 
 
 def worlds() -> str:
     """The presets of worlds, and all parameters with unit and range."""
-    told = attributes(WorldParams)
+    told = described(WorldParams)
     fields = describe(WorldParams)
     rows = [
         (
@@ -133,7 +121,7 @@ def worlds() -> str:
     ]
     orchard = WORLDS.find("orchard")
     parameters = {name: each.default for name, each in inspect.signature(orchard).parameters.items() if name != "seed"}
-    own = [(f"`{name}`", arguments(orchard)[name], f"`{default:g}`") for name, default in parameters.items()]
+    own = [(f"`{name}`", described(orchard)[name], f"`{default:g}`") for name, default in parameters.items()]
     return "\n".join([
         "# Parameters of worlds", "",
         "A preset's name, and after it any of these parameters, is a world: `--world 'meadow field_width=20 trees=0'`. A value outside its "
@@ -159,7 +147,7 @@ def run_settings() -> str:
     """The settings of runs: columns of runs.parquet, and of the settings in summary.json."""
     rows = [
         (f"`{name}`", _kind(kind), help_of(RunOptions, name) if hasattr(RunOptions, name) else "")
-        for name, (kind) in TYPES.items()
+        for name, kind in TYPES.items()
     ]
     return "\n".join([
         "# Settings of runs", "",
@@ -178,20 +166,13 @@ def _kind(kind: Any) -> str:
     )
 
 
-def attributes(cls: type) -> dict[str, str]:
-    """What a class's docstring says of each attribute."""
-    return _entries(inspect.getdoc(cls) or "", "Attributes")
+def described(documented: Any) -> dict[str, str]:
+    """What a docstring says of each attribute of a class, or of each argument of a function."""
+    return _descriptions(docstring_parser.parse(inspect.getdoc(documented) or ""))
 
 
-def arguments(function: Any) -> dict[str, str]:
-    """What a function's docstring says of each argument."""
-    return _entries(inspect.getdoc(function) or "", "Args")
-
-
-def _entries(text: str, section: str) -> dict[str, str]:
-    lines = re.search(rf"{section}:\n((?:    .*\n?|\n)+)", text)
-    entries = re.findall(r"^    (\w+): (.+(?:\n      +.+)*)", lines.group(1) if lines else "", flags=re.MULTILINE)
-    return {name: " ".join(words.split()) for name, words in entries}
+def _descriptions(parsed: docstring_parser.Docstring) -> dict[str, str]:
+    return {each.arg_name: " ".join((each.description or "").split()) for each in parsed.params}
 
 
 def table(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:

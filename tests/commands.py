@@ -73,6 +73,15 @@ def printed(capfd, *arguments: Any, code: int = 0) -> dict[str, Any]:
     return checked(arguments, out)
 
 
+class Process(subprocess.Popen):
+    """A process that is killed at the end of its `with` block, unless it has ended: one that hangs does not hold up the tests."""
+
+    def __exit__(self, *error: Any) -> None:
+        if self.poll() is None:
+            self.kill()
+        super().__exit__(*error)
+
+
 def process(*arguments: Any, **options: Any) -> subprocess.CompletedProcess:
     """A command in a process of its own."""
     return subprocess.run([TUSSOCK, *map(str, arguments)], capture_output=True, text=True, **options)

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from commands import Process
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -212,11 +213,11 @@ def test_a_folder_with_anything_else_is_refused_and_nothing_is_changed(tmp_path,
 MANY = ["--world", "tiny", "--seed", "1", "--size", "24x6", "--spacing-m", "0.08"]  # 38 x 38 views
 
 
-def drawing(out: Path) -> subprocess.Popen:
+def drawing(out: Path) -> Process:
     """tussock database grid, running."""
     command = [sys.executable, "-m", "tussock", "database", "grid", *MANY, "--out", str(out), "--json"]
     here = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
-    process = subprocess.Popen(command, env=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = Process(command, env=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (out / METADATA).exists():
         assert process.poll() is None
         time.sleep(0.005)

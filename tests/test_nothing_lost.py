@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from commands import TUSSOCK, process, process_json
+from commands import TUSSOCK, Process, process, process_json
 
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.recording.viewer import viewer_program
@@ -33,7 +33,7 @@ def enlarge(disk: Path) -> None:
 def test_a_killed_run_explains_how_to_go_on_and_its_recording_opens(tmp_path):
     out = tmp_path / "run"
     walk = [TUSSOCK, "run", *WORLD, "--step-m", "0.002", "--out", out]  # over a thousand steps
-    with subprocess.Popen(walk, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
+    with Process(walk, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
         recording = out / "recording.rrd"
         while not (recording.exists() and recording.stat().st_size > 400_000):
             assert running.poll() is None

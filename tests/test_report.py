@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib
 import pytest
 from browser import WIDTHS, in_browser
+from commands import Process
 from figure_laws import check_figure
 
 from tussock.navigation.cli.main import main
@@ -49,7 +50,7 @@ def replication(tmp_path_factory) -> Path:
     """A whole replication, interrupted once."""
     out = tmp_path_factory.mktemp("thesis") / "report"
     command = [sys.executable, "-m", "tussock", "replicate", "thesis", *TINY, "--out", str(out), "--json"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    with Process(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:
             if line.startswith("resolution: done"):

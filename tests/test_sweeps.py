@@ -24,7 +24,7 @@ import pandas as pd
 import psutil
 import pytest
 from browser import WIDTHS, in_browser
-from commands import TUSSOCK, printed, process_json, tussock
+from commands import TUSSOCK, Process, printed, process_json, tussock
 from PIL import Image
 from scale import fill, sweep_file
 
@@ -623,20 +623,14 @@ def finished(out: Path) -> int:
 
 
 @contextmanager
-def running(path: Path, out: Path, *words, runs: int = 3) -> Iterator[subprocess.Popen]:
+def running(path: Path, out: Path, *words, runs: int = 3) -> Iterator[Process]:
     """A sweep that has finished some of its runs, but not all."""
     command = [TUSSOCK, "sweep", str(path), "--out", str(out), "--json", *words]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
-        try:
-            while finished(out) < runs:
-                assert process.poll() is None, process.communicate()
-                time.sleep(0.05)
-            yield process
-        finally:
-            if process.poll() is None:
-                process.kill()
+    with Process(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        while finished(out) < runs:
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.05)
+        yield process
 
 
 @contextmanager

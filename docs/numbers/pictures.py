@@ -114,7 +114,7 @@ def measure_models(folder: Path) -> Values:
 
 
 def measure_worlds(folder: Path) -> Values:
-    """The figures of docs/worlds.md: each preset from above, and as an eye sees it from the middle."""
+    """The figures of docs/worlds.md: each preset from above, and as an eye sees it at the start of a route."""
     drawn, triangles = {}, {}
     for name in WORLDS.builtin:
         world = World.generate(name, seed=WORLD_SEED)

@@ -9,10 +9,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import make_dataclass
-from functools import cache
 from importlib import import_module
 from importlib.metadata import version
-from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_type_hints
 
 import tyro
@@ -22,6 +20,7 @@ from tussock.world.errors import InputError
 from ..setting_names import message_of
 from .interruption import end_on_signals
 from .terminal import library_messages, message, show
+from .unimported import class_at
 
 # Where the class of a command is, by its name; or a sentence and the commands that go under one name.
 COMMANDS: dict[str, Any] = {
@@ -139,9 +138,7 @@ def _with_plain_types(command: type) -> type:
         told = [getattr(each, "metavar", None) for each in getattr(hint, "__metadata__", ())]
         kinds = get_args(hint.__origin__ if told else hint)
         if type(None) in kinds and not any(told):
-            metavar = "|".join(
-                "STR" if each is str else each.__name__.upper() for each in kinds if each is not type(None)
-            )
+            metavar = "|".join(each.__name__.upper() for each in kinds if each is not type(None))
             command.__annotations__[name] = Annotated[hint, tyro.conf.arg(metavar=metavar)]
     return command
 
@@ -150,14 +147,8 @@ def _sentence(command: Any) -> str:
     """What a command does: the docstring of its class, which is read, not imported, as that takes long."""
     if isinstance(command, tuple):
         return command[0]
-    module, _, name = command.partition(":")
-    classes = [each for each in _syntax(module).body if isinstance(each, ast.ClassDef) and each.name == name]
-    return ast.get_docstring(classes[0]) or name
-
-
-@cache
-def _syntax(module: str) -> ast.Module:
-    return ast.parse(Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8"))
+    found = class_at(f"{__package__}.{command}")
+    return ast.get_docstring(found) or found.name
 
 
 def _placeholder(sentence: str) -> type:

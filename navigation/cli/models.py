@@ -2,7 +2,6 @@
 
 import ast
 import dataclasses
-import importlib.util
 import math
 import time
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from tussock.world.errors import FileError, SettingError
 from ..experiment_fields import MODEL_SUFFIX
 from .options import Command, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
+from .unimported import class_at
 
 if TYPE_CHECKING:
     from tussock.world.scene import World
@@ -214,12 +214,7 @@ class ModelsCommand(Command):
 
 def described(where: str) -> dict[str, str]:
     """What a class of tussock is and where it comes from; its file is read, not imported, as that takes seconds."""
-    module, _, name = where.partition(":")
-    spec = importlib.util.find_spec(module)
-    assert spec is not None
-    assert spec.origin is not None
-    body = ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body
-    (found,) = (each for each in body if isinstance(each, ast.ClassDef) and each.name == name)
+    found = class_at(where)
     papers = [
         each.value.value for each in found.body
         if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "paper" and isinstance(each.value, ast.Constant)

@@ -208,8 +208,6 @@ def _gif(path: Path, rate: float) -> Iterator[Callable[[Frame], Any]]:
     frames: list[Frame] = []
     size = (GIF_WIDTH, GIF_WIDTH * SIZE[1] // SIZE[0])
     yield lambda frame: frames.append(cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
-    if not frames:
-        return
     # The same colours in all frames, so that what stays the same costs nothing.
     some = np.concatenate(frames[:: max(1, len(frames) // 5)])
     colours = Image.fromarray(some).quantize(GIF_COLOURS)

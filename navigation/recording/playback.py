@@ -39,7 +39,7 @@ def play(
     Raises:
         FileError: Where there is no recording.
         SettingError: For more than one of `web`, `screenshot` and `video`.
-        MissingDependencyError: Where there is no display, and none of these; and for an .mp4 without imageio-ffmpeg.
+        MissingDependencyError: Without a display where none of these is given, and for an .mp4 without imageio-ffmpeg.
     """
     if web + (screenshot is not None) + (video is not None) > 1:
         raise SettingError("--web, --screenshot and --video each take the place of the others: give one of them")

@@ -44,18 +44,20 @@ class RecordedWalk:
 
 
 def read_walk(recording: Path) -> RecordedWalk:
-    """Read what a film shows. Raises FileError for a file that is no recording of a walk."""
+    """Read what a film shows. Raises FileError for a file that is not a recording of a walk."""
     try:
         timed, constant = _contents(recording)
         # Of a walk that was killed, the last steps may not have all columns.
         steps = np.array(
             sorted(timed["/world/agent:Arrows3D:origins"].keys() & timed["/deviation/m:Scalars:scalars"].keys())
         )
+        if len(steps) == 0:
+            raise ValueError("it has no step")
         format_ = constant["/view:Image:format"][0]
         shape = (format_["height"].as_py(), format_["width"].as_py(), 3)
     except (KeyError, ValueError, RuntimeError, OSError) as error:
         raise FileError(
-            f"{recording} is no recording of a walk ({first_line(error)}); give the folder of a run"
+            f"{recording} is not a recording of a walk ({first_line(error)}); give the folder of a run"
         ) from error
 
     def rows(name: str, columns: int) -> Float[np.ndarray, "n columns"]:
