@@ -38,7 +38,7 @@ def test_the_walk_is_read_as_it_was_walked(run):
     assert np.allclose(read.facing, np.column_stack([np.cos(turned), np.sin(turned)]), atol=1e-5)
     assert set(read.views) == set(range(len(walk)))
     assert read.views[0].shape == (15, 72, 3)
-    assert len(read.familiarity) == sum(value is not None for value in walk.column("familiarity"))
+    assert len(read.familiarity) == sum(looks > 1 for looks in walk.column("looks"))
     assert np.allclose(np.array(experiment("scan").open_world_and_route()[1].xy), read.route, atol=1e-5)
 
 
