@@ -83,8 +83,10 @@ class Process(subprocess.Popen):
 
 
 def process(*arguments: Any, **options: Any) -> subprocess.CompletedProcess:
-    """A command in a process of its own."""
-    return subprocess.run([TUSSOCK, *map(str, arguments)], capture_output=True, text=True, **options)
+    """A command in a process of its own; one that hangs is killed, and fails the test, before pytest's own limit is over."""
+    return subprocess.run(
+        [TUSSOCK, *map(str, arguments)], capture_output=True, text=True, **{"timeout": 400, **options}
+    )
 
 
 def interrupted(ready: Callable[[], bool], *arguments: Any) -> tuple[int, str]:

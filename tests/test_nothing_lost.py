@@ -7,12 +7,14 @@ import json
 import shlex
 import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 
 import pytest
 from commands import TUSSOCK, Process, process, process_json
 
+from tussock.navigation.recording import disk
 from tussock.navigation.recording.log import Recording
 from tussock.navigation.recording.viewer import viewer_program
 from tussock.render.eye import Eye
@@ -109,3 +111,16 @@ def test_a_recording_does_not_wait_for_ever_for_its_disk(tmp_path):
         stream.disconnect()
         with pytest.raises(DiskFullError, match=r"r\.rrd .+ make room"):
             recording.close()
+
+
+def test_a_writer_that_gives_no_answer_holds_up_neither_the_recording_nor_the_end_of_the_process(monkeypatch, caplog):
+    released = threading.Event()
+    unregistered = []
+    stream = Silent()
+    monkeypatch.setattr(stream, "disconnect", released.wait, raising=False)
+    monkeypatch.setattr(disk, "CLOSE_SECONDS", 0.05)
+    monkeypatch.setattr(disk.rr, "unregister_shutdown", lambda: unregistered.append(True))
+    disk.close(stream)
+    released.set()
+    assert "did not close" in caplog.text
+    assert unregistered

@@ -7,6 +7,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import rerun as rr
+
 from tussock.world.errors import DiskFullError
 
 ASK_SECONDS = 0.5  # that the writer gets to answer, before the disk is looked at
@@ -34,11 +36,12 @@ def flush(stream: Any, path: Path) -> None:
 
 
 def close(stream: Any) -> None:
-    """Close a stream of rerun, or leave it where its writer gives no answer."""
+    """Close a stream of rerun, or leave it where its writer gives no answer: rerun would wait for it once more when the process ends."""
     closing = threading.Thread(target=stream.disconnect, daemon=True)
     closing.start()
     closing.join(timeout=CLOSE_SECONDS)
     if closing.is_alive():
+        rr.unregister_shutdown()
         log.warning(
             "rerun did not close a recording within %g s; it has no index, and opens more slowly", CLOSE_SECONDS
         )
