@@ -67,6 +67,7 @@ from .world import World as World
 from .world import WorldParams as WorldParams
 from .world import column_azimuths as column_azimuths
 from .world import generate_route as generate_route
+from .world import no_progress as no_progress
 from .world import open_world as open_world
 from .world import read_route as read_route
 from .world import read_world as read_world

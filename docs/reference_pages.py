@@ -12,7 +12,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 
-from tussock.navigation.cli.main import COMMANDS, commands_for
+from tussock.navigation.cli.main import command_of
+from tussock.navigation.cli.overview import COMMANDS
 from tussock.navigation.cli.options import RunOptions
 from tussock.navigation.settings_table import TYPES
 from tussock.world.params import PRESETS, WORLDS, WorldParams
@@ -44,7 +45,7 @@ def commands() -> str:
         "",
     ]
     for name in COMMANDS:
-        found = commands_for([name])[name]
+        found = command_of(name)
         if isinstance(found, tuple):
             text += [f"## tussock {name}", "", found[0], ""]
             for below, command in found[1].items():

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Float32
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Route, wrap_angle
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, no_progress, printed
 
 from .encoding import Encoding
 from .models.base import FamiliarityModel, Images, SnapshotModel
@@ -150,7 +150,12 @@ def recovered_headings(
 
 
 def heading_field(
-    model: FamiliarityModel, encoding: Encoding, renderer: Renderer, positions: Float[np.ndarray, "n 2"]
+    model: FamiliarityModel,
+    encoding: Encoding,
+    renderer: Renderer,
+    positions: Float[np.ndarray, "n 2"],
+    *,
+    progress: Progress | None = None,
 ) -> Float[np.ndarray, "n 3"]:
     """The most familiar heading at each of some positions, among all headings.
 
@@ -159,14 +164,17 @@ def heading_field(
         encoding: That of the views that it learned.
         renderer: Draws the views.
         positions: (n, 2) Where to look around (m).
+        progress: Called with how many positions are done, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         (n, 3) The positions (m) with these headings (rad).
     """
-    poses, headings = facing_east(positions), [np.empty(0)]
+    progress = printed(progress, "looking around", "positions")
+    poses, headings = facing_east(positions), np.empty(0)
     for views in encoded_views(encoding, renderer, poses):
-        headings.append(recovered_headings(model, views, np.zeros(len(views))))
-    return np.column_stack([poses[:, :2], np.concatenate(headings)])
+        headings = np.concatenate([headings, recovered_headings(model, views, np.zeros(len(views)))])
+        progress(len(headings), len(poses))
+    return np.column_stack([poses[:, :2], headings])
 
 
 def heading_errors(
@@ -177,7 +185,7 @@ def heading_errors(
     positions: Float[np.ndarray, "n k"],
     *,
     scan: float = 2 * np.pi,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> HeadingErrors:
     """Let a trained model recover the heading at each position, and compare it with the nearest route view's.
 
@@ -188,8 +196,9 @@ def heading_errors(
         route: Its points are the route views.
         positions: (n, 2) m, where views face east; or (n, 3) poses.
         scan: Full width of the scan (rad), about the right heading where it is not full.
-        progress: Called with how many positions are done, of how many.
+        progress: Called with how many positions are done, of how many; None prints a line where it takes long, `no_progress` none.
     """
+    progress = printed(progress, "recovering headings", "positions")
     poses = facing_east(positions)
     views = encoded_views(encoding, renderer, poses)
     about = route.poses[nearest_view(route, poses[:, :2]), 2]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from tussock.world.errors import SettingError
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, no_progress, printed
 from tussock.world.settings import converted, instance_of, number, settings
 from tussock.world.specs import Spec, takes
 
@@ -224,8 +224,9 @@ class Experiment(Surroundings):
         yield from (step for (step,) in steps_of([self], trained) if step is not None)
 
     @contextmanager
-    def opened(self, progress: Progress = no_progress) -> Iterator["TrainedNavigator"]:
+    def opened(self, progress: Progress | None = None) -> Iterator["TrainedNavigator"]:
         """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
+        progress = printed(progress, "learning", "views")
         from .walker import check_inside
 
         world, route = self.open_world_and_route()
@@ -235,16 +236,19 @@ class Experiment(Surroundings):
             log.info(f"renderer: {renderer.backend}{device}")
             yield self.train(renderer, route, progress)
 
-    def run(self, progress: Progress = no_progress) -> "Trajectory":
+    def run(self, progress: Progress | None = None) -> "Trajectory":
         """Learn the route and walk it.
 
         Args:
-            progress: Called with how many steps are made, of how many there may be.
+            progress: Called with how many steps are made, of how many there may be; None prints a line where it
+                takes long, `no_progress` none.
         """
+        learning = None if progress is None else no_progress
+        progress = printed(progress, "walking", "steps")
         from .trajectory import Trajectory
 
         trajectory = Trajectory()
-        with self.opened() as trained:
+        with self.opened(learning) as trained:
             limit = self.stopping.step_limit(trained.route.length, self.body.step_length)
             for step, diagnosis in self.steps(trained):
                 trajectory.add(step, diagnosis)

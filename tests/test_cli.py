@@ -18,7 +18,8 @@ import pytest
 import trimesh
 from commands import KEYS, TUSSOCK, Process, printed, process, process_json, tussock
 
-from tussock.navigation.cli.main import COMMANDS, main
+from tussock.navigation.cli.main import main
+from tussock.navigation.cli.overview import COMMANDS, GROUPS
 from tussock.navigation.evaluation import grid_positions
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.models import MODELS
@@ -54,7 +55,8 @@ def test_help_lists_every_command(capfd):
     code, out, _ = tussock(capfd, "--help")
     assert code == 0
     assert set(COMMANDS) == {name.split()[0] for name in KEYS}
-    assert all(name in out for name in COMMANDS)
+    assert all(name in out for name in [*COMMANDS, *GROUPS, "--version"])
+    assert max(map(len, out.splitlines())) <= 80
     for name in COMMANDS:
         assert tussock(capfd, name, "--help")[0] == 0
 
@@ -62,6 +64,15 @@ def test_help_lists_every_command(capfd):
 def test_the_version_is_that_of_the_package(capfd):
     expected = tomllib.loads(Path(__file__).parents[1].joinpath("pyproject.toml").read_text())["project"]["version"]
     assert tussock(capfd, "--version")[:2] == (0, f"tussock {expected}\n")
+
+
+def test_no_command_shows_them_all_and_a_wrong_one_is_one_line(capfd):
+    code, out, _ = tussock(capfd)
+    assert code == 2
+    assert all(name in out for name in COMMANDS)
+    code, out, err = tussock(capfd, "wrold")
+    assert (code, out) == (2, "")
+    assert err == "tussock: there is no command 'wrold' (did you mean 'world'?); tussock --help lists all\n"
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])

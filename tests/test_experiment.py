@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from navigators import AHEAD
 
 from tussock.navigation.body import Body
-from tussock.navigation.cli.main import choice_of, commands_for, main
+from tussock.navigation.cli.main import choice_of, command_of, main
 from tussock.navigation.cli.models import RunCommand
 from tussock.navigation.cli.options import RunOptions
 from tussock.navigation.devices import chosen_device
@@ -167,7 +167,7 @@ def write_mask(path: Path, hidden: int) -> None:
 def parsed(arguments: list[str]) -> Any:
     """A command with its flags."""
     config = (tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
-    return tyro.cli(choice_of(commands_for(arguments)), args=arguments, config=config)
+    return tyro.cli(choice_of({arguments[0]: command_of(arguments[0])}), args=arguments, config=config)
 
 
 # Settings

@@ -13,6 +13,7 @@ from .geometry import column_azimuths as column_azimuths
 from .geometry import turn_of_columns as turn_of_columns
 from .meshes.reading import MeshReading as MeshReading
 from .params import WorldParams as WorldParams
+from .progress import no_progress as no_progress
 from .route_files import read_route as read_route
 from .route_files import write_route as write_route
 from .routes import generate_route as generate_route

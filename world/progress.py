@@ -1,5 +1,7 @@
 """Progress of long work: a function that is called with how much is done, of how much."""
 
+import sys
+import time
 from collections.abc import Callable
 
 Progress = Callable[[int, int], object]
@@ -7,3 +9,42 @@ Progress = Callable[[int, int], object]
 
 def no_progress(done: int, total: int) -> None:
     """Report nothing."""
+
+
+class PrintedProgress:
+    """Prints a line on standard error now and then, where work takes long: how much is done, how fast, and how long the rest takes.
+
+    Args:
+        what: What is being done.
+        unit: Of what it is counted in.
+        to_the_end: Whether to print the last line where there was none before.
+    """
+
+    FIRST, PAUSE = 2.0, 10.0  # seconds until the first line, and between two
+
+    def __init__(self, what: str, unit: str = "", *, to_the_end: bool = False):
+        self.what, self.unit, self.to_the_end = what, unit, to_the_end
+        self.began = time.monotonic()
+        self.next = self.began + self.FIRST
+        self.before: int | None = None  # done before this began
+        self.rate = 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        """Print how far it is, unless that was printed a moment ago."""
+        if self.reached(done) and (time.monotonic() > self.next or (self.to_the_end and done == total)):
+            self.next = time.monotonic() + self.PAUSE
+            counted = f"{done} of {total} {self.unit}".rstrip()
+            minutes = (total - done) / self.rate / 60
+            print(f"{self.what}: {counted}, {self.rate:.3g} a second, {minutes:.2g} min left", file=sys.stderr)
+
+    def reached(self, done: int) -> float:
+        """How much is done in a second, of the work that was done since this began (1/s)."""
+        if self.before is None:
+            self.before = done
+        self.rate = (done - self.before) / max(time.monotonic() - self.began, 1e-9)
+        return self.rate
+
+
+def printed(progress: Progress | None, what: str, unit: str = "") -> Progress:
+    """A progress that was given, or a new one that prints."""
+    return PrintedProgress(what, unit) if progress is None else progress

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from ..experiment import Experiment
 from ..rl.environment import RouteFollowing
@@ -53,7 +53,7 @@ def enter_learner(
     *,
     encoding: str | None = ENCODING,
     benchmark: Benchmark = BENCHMARK,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> tuple[Result, Path]:
     """Enter a learner.
 
@@ -64,7 +64,7 @@ def enter_learner(
         out: The result is written to `out`/results.
         encoding: What the learner gets of a view; None is the panorama itself.
         benchmark: What is asked.
-        progress: Called with how many runs are finished, of how many.
+        progress: Called with how many runs are finished, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The result and its file.
@@ -72,6 +72,7 @@ def enter_learner(
     Raises:
         InputError: As `enter_named` does.
     """
+    progress = printed(progress, "walking", "runs")
     done: list[Experiment] = []
     results: list[dict[str, Any]] = []
     chain = PANORAMA if encoding is None else benchmark.chain(encoding)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tussock.world.errors import InputError, SettingError
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from ..experiment import Experiment
 from ..experiment_fields import MODEL_SUFFIX
@@ -30,7 +30,7 @@ def enter_named(
     navigator: str = NAVIGATOR,
     benchmark: Benchmark = BENCHMARK,
     workers: str | int | None = None,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> list[tuple[Result, Path]]:
     """Enter models by their specs.
 
@@ -41,7 +41,7 @@ def enter_named(
         navigator: What steers by them; one other than a scan is part of the entry's name.
         benchmark: What is asked.
         workers: See `run_sweep`.
-        progress: Called with how many runs are finished, of how many.
+        progress: Called with how many runs are finished, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         For each model the result and its file.
@@ -49,6 +49,7 @@ def enter_named(
     Raises:
         InputError: Where there is a result of another version, or of another entry under the same name.
     """
+    progress = printed(progress, "walking", "runs")
     chain = benchmark.chain(encoding)
     models = list(dict.fromkeys(map(checked_entry, names)))
     steers = str(NAVIGATORS.spec(navigator))
@@ -97,7 +98,7 @@ def enter(
     *,
     encoding: str = ENCODING,
     benchmark: Benchmark = BENCHMARK,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> tuple[Result, Path]:
     """Enter any familiarity model from Python. The runs of a world walk side by side in this process, on one thread of torch.
 
@@ -107,7 +108,7 @@ def enter(
         out: The result is written to `out`/results.
         encoding: What the model gets of a view.
         benchmark: What is asked.
-        progress: Called with how many runs are finished, of how many.
+        progress: Called with how many runs are finished, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The result and its file.
@@ -115,6 +116,7 @@ def enter(
     Raises:
         InputError: As `enter_named` does.
     """
+    progress = printed(progress, "walking", "runs")
     done: list[Experiment] = []
     results: list[dict[str, Any]] = []
     chain = benchmark.chain(encoding)

@@ -1,6 +1,5 @@
 """The command line: gives flags to the commands, and prints their results."""
 
-import ast
 import atexit
 import gc
 import json
@@ -8,7 +7,6 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import make_dataclass
 from importlib import import_module
 from importlib.metadata import version
 from typing import Annotated, Any, Union, get_args, get_type_hints
@@ -16,49 +14,12 @@ from typing import Annotated, Any, Union, get_args, get_type_hints
 import tyro
 
 from tussock.world.errors import InputError
+from tussock.world.registry import suggestion
 
 from ..setting_names import message_of
 from .interruption import end_on_signals
+from .overview import COMMANDS, overview
 from .terminal import library_messages, message, show
-from .unimported import class_at
-
-# Where the class of a command is, by its name; or a sentence and the commands that go under one name.
-COMMANDS: dict[str, Any] = {
-    "world": "worlds:WorldCommand",
-    "view": "worlds:ViewCommand",
-    "route": "worlds:RouteCommand",
-    "evaluate": "models:EvaluateCommand",
-    "train": "models:TrainCommand",
-    "compare": "models:CompareCommand",
-    "ridf": "images:RidfCommand",
-    "catchment": "images:CatchmentCommand",
-    "place": "images:PlaceCommand",
-    "models": "models:ModelsCommand",
-    "run": "models:RunCommand",
-    "play": "models:PlayCommand",
-    "sweep": "sweeps:SweepCommand",
-    "report": "sweeps:ReportCommand",
-    "benchmark": "benchmark:BenchmarkCommand",
-    "replicate": (
-        "Re-run a published study and write a report to read next to it.",
-        {
-            "thesis": "studies:ThesisCommand",
-            "knight2019": "published_images:Knight2019Command",
-            "stone2017": "worldless:Stone2017Command",
-        },  # and the protocols: see `commands_for`
-    ),
-    "study": "studies:StudyCommand",
-    "database": (
-        "Draw image databases in the BoB format, make them of pictures, and look for what is wrong with them.",
-        {
-            "grid": "databases:DatabaseGridCommand",
-            "route": "databases:DatabaseRouteCommand",
-            "import": "pictures:DatabaseImportCommand",
-            "check": "databases:DatabaseCheckCommand",
-        },
-    ),
-    "unwrap": "pictures:UnwrapCommand",
-}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -69,12 +30,16 @@ def main(arguments: list[str] | None = None) -> None:
     if arguments == ["--version"]:
         print(f"tussock {version('tussock')}")
         return
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(overview())
+        sys.exit(0 if arguments else 2)
+    if arguments[0] not in COMMANDS:
+        fail(f"there is no command {arguments[0]!r}{suggestion(arguments[0], COMMANDS)}; tussock --help lists all")
     command = tyro.cli(
-        choice_of(commands_for(arguments)),
+        choice_of({arguments[0]: command_of(*arguments[:2])}),
         prog="tussock",
         args=arguments,
         config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-        description="Insect visual route navigation: make a world, look around in it, learn a route, walk it home.",
     )
     end_on_signals()
     try:
@@ -107,21 +72,15 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(130)
 
 
-def commands_for(arguments: list[str]) -> dict[str, Any]:
-    """The commands that some arguments choose from. Only the chosen one is imported: so its flags, or all sentences, appear at once."""
-    chosen = arguments[0] if arguments and arguments[0] in COMMANDS else None
-    commands: dict[str, Any] = {
-        name: _placeholder("" if chosen else _sentence(each)) for name, each in COMMANDS.items()
-    }
-    if chosen is not None:
-        commands[chosen] = _imported(COMMANDS[chosen])
-    if chosen == "replicate":  # packages may add protocols
+def command_of(name: str, below: str = "") -> Any:
+    """The class of a command, or a sentence and the classes of the commands under its name. Others are not imported, so help is fast."""
+    command = _imported(COMMANDS[name])
+    if name == "replicate":  # packages may add protocols
         from .protocols import protocol_commands
 
-        sentence, fixed = commands["replicate"]
-        protocols = protocol_commands(*arguments[1:2])
-        commands["replicate"] = (sentence, fixed | {name: _with_plain_types(each) for name, each in protocols.items()})
-    return commands
+        sentence, fixed = command
+        return sentence, fixed | {each: _with_plain_types(cls) for each, cls in protocol_commands(below).items()}
+    return command
 
 
 def _imported(command: Any) -> Any:
@@ -133,27 +92,15 @@ def _imported(command: Any) -> Any:
 
 
 def _with_plain_types(command: type) -> type:
-    """A command whose help says INT where a flag takes a whole number or is left out, and not {None}|INT."""
+    """A command whose help says INT where a flag takes a whole number or is left out: not {None}|INT, and no (default: None)."""
     for name, hint in get_type_hints(command, include_extras=True).items():
         told = [getattr(each, "metavar", None) for each in getattr(hint, "__metadata__", ())]
         kinds = get_args(hint.__origin__ if told else hint)
-        if type(None) in kinds and not any(told):
+        if type(None) in kinds:
             metavar = "|".join(each.__name__.upper() for each in kinds if each is not type(None))
-            command.__annotations__[name] = Annotated[hint, tyro.conf.arg(metavar=metavar)]
+            shown = next(filter(None, told), metavar)
+            command.__annotations__[name] = Annotated[hint, tyro.conf.arg(metavar=shown, help_behavior_hint="")]
     return command
-
-
-def _sentence(command: Any) -> str:
-    """What a command does: the docstring of its class, which is read, not imported, as that takes long."""
-    if isinstance(command, tuple):
-        return command[0]
-    found = class_at(f"{__package__}.{command}")
-    return ast.get_docstring(found) or found.name
-
-
-def _placeholder(sentence: str) -> type:
-    """A command without flags, for a list of the commands."""
-    return make_dataclass("Placeholder", [], namespace={"__doc__": sentence})
 
 
 def choice_of(commands: dict[str, Any]) -> Any:

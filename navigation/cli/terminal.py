@@ -2,11 +2,12 @@
 
 import logging
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from logging.handlers import MemoryHandler
 from typing import Any
+
+from tussock.world.progress import PrintedProgress
 
 from .interruption import check_interrupted
 
@@ -68,9 +69,10 @@ def progress_of_parts() -> Iterator[Callable[[str, int, int], object]]:
 
 @contextmanager
 def progress(what: str, unit: str, *, verbose: bool = False) -> Iterator[Callable[..., object]]:
-    """Show progress on standard error, where that is a terminal; gives a function report(done, total, description=what).
+    """Show progress on standard error, as a bar or, where that is no terminal, as a line now and then; gives a function
+    report(done, total, description=what).
 
-    verbose: for work of hours: show the rate as well, and elsewhere, as in the log of a job, print a line now and then.
+    verbose: for work of hours: show the rate as well, and say when all is done.
     """
     # Late: rich takes a tenth of a second that --help does not need.
     from rich.console import Console
@@ -78,48 +80,21 @@ def progress(what: str, unit: str, *, verbose: bool = False) -> Iterator[Callabl
 
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), unit, TimeRemainingColumn())
     console = Console(stderr=True)
-    pace = _Pace(unit) if verbose else None
+    line = PrintedProgress(what, unit, to_the_end=verbose)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
 
-        def report(done: int, total: int, **changed: Any) -> None:
+        def report(done: int, total: int, description: str = what) -> None:
+            nonlocal line
             check_interrupted()
-            if pace is not None:
-                pace.reached(done, total)
-                changed["description"] = f"{what} {pace.rate:.3g} a second"
-                if not console.is_terminal:
-                    pace.report()
-            bar.update(task, completed=done, total=total, **changed)
+            if description != line.what:
+                line = PrintedProgress(description, unit, to_the_end=verbose)
+            if not console.is_terminal:
+                line(done, total)
+            rate = f" {line.reached(done):.3g} a second" if verbose else ""
+            bar.update(task, completed=done, total=total, description=description + rate)
 
         yield report
-
-
-class _Pace:
-    """How fast work goes on."""
-
-    SECONDS = 30.0  # between two lines
-
-    def __init__(self, unit: str):
-        self.unit, self.done, self.total = unit, 0, 0
-        self.first: int | None = None  # done before this began
-        self.began = self.reported = time.monotonic()
-
-    def reached(self, done: int, total: int) -> None:
-        if self.first is None:
-            self.first = done
-        self.done, self.total = done, total
-
-    @property
-    def rate(self) -> float:
-        """Of the work that was done here (1/s)."""
-        return (self.done - (self.first or 0)) / max(time.monotonic() - self.began, 1e-9)
-
-    def report(self) -> None:
-        """Print how far it is, unless that was printed a moment ago."""
-        if self.rate and (time.monotonic() - self.reported > self.SECONDS or self.done == self.total):
-            self.reported = time.monotonic()
-            minutes = (self.total - self.done) / self.rate / 60
-            message(f"{self.done} of {self.total} {self.unit}, {self.rate:.3g} a second, {minutes:.3g} min left")
 
 
 def show(result: dict[str, Any]) -> None:
@@ -159,6 +134,10 @@ def show_table(name: str, rows: dict[str, dict[str, Any]]) -> None:
 
 def text(value: Any) -> str:
     """A value as people read it."""
+    if value is None:
+        return "-"
+    if isinstance(value, tuple):
+        return ", ".join(map(text, value))
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int):

@@ -22,7 +22,7 @@ from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Pose, Route, columns_of_turn, wrap_angle
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from ..encoding import Encoding
 from ..evaluation import MAX_POSITIONS, encoded_views, facing_east
@@ -143,7 +143,7 @@ def landscape(
     spacing: float,
     *,
     best: bool = True,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> Landscape:
     """What a trained model finds at poses around a route, or around one pose.
 
@@ -155,8 +155,9 @@ def landscape(
         poses: See `positions_around`.
         spacing: Their spacing (m).
         best: Take the familiarity of the best rotation; else that at the heading of the nearest reference view.
-        progress: Called with how many views are compared, of how many.
+        progress: Called with how many views are compared, of how many; None prints a line where it takes long, `no_progress` none.
     """
+    progress = printed(progress, "comparing", "views")
     references = around.poses if isinstance(around, Route) else np.array([around])
     right = references[KDTree(references[:, :2]).query(poses[:, :2])[1], 2]
     scans = [np.empty((0, 0))]

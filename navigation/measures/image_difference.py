@@ -19,7 +19,7 @@ from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Route, columns_of_turn
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from ..encoding import Encoding
 from ..evaluation import encoded_views
@@ -108,7 +108,7 @@ def differences_of_places(
     references: Float[np.ndarray, "m 3"],
     *,
     aligned: bool = False,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, "k 3"]]:
     """The image difference of each query view from each reference view.
 
@@ -119,11 +119,12 @@ def differences_of_places(
         references: Poses of the reference views.
         aligned: Compare them at one compass heading, where they differ by inf if too little of both is seen there; else at the
             rotation at which they differ least.
-        progress: Called with how many queries are compared, of how many.
+        progress: Called with how many queries are compared, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The differences, and the poses of the references that show anything (see `training_views`).
     """
+    progress = printed(progress, "comparing", "views")
     mask = encoding.for_eye(renderer.eye).mask
     views, kept = training_views(encoding, renderer, references)
     rows, done = [], 0

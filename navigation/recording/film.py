@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt8
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError, MissingDependencyError, SettingError, first_line
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from .log import PATH_COLOUR, ROUTE_COLOUR
 from .recorded_walk import RecordedWalk, read_walk
@@ -142,14 +142,14 @@ def _write(image: Frame, text: str, at: tuple[int, int], size: float = 0.55) -> 
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
 
 
-def save_film(recording: Path, film: Path, *, steps_per_second: float = 10.0, progress: Progress = no_progress) -> int:
+def save_film(recording: Path, film: Path, *, steps_per_second: float = 10.0, progress: Progress | None = None) -> int:
     """Write a recording as a film.
 
     Args:
         recording: The recording.
         film: File to write: .mp4 (needs the package imageio-ffmpeg) or .gif.
         steps_per_second: Speed.
-        progress: Called with how many steps are drawn, of how many.
+        progress: Called with how many steps are drawn, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The number of frames.
@@ -159,6 +159,7 @@ def save_film(recording: Path, film: Path, *, steps_per_second: float = 10.0, pr
         SettingError: For another speed.
         MissingDependencyError: Where imageio-ffmpeg is needed, and missing.
     """
+    progress = printed(progress, "drawing", "steps")
     writers = {".mp4": _mp4, ".gif": _gif}
     if film.suffix.lower() not in writers:
         raise FileError(f"{film}: a film is written as .mp4 or .gif")

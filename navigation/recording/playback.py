@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tussock.world.errors import FileError, MissingDependencyError, SettingError
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress
 
 from .viewer import save_screenshot, watch
 
@@ -24,7 +24,7 @@ def play(
     screenshot: Path | None = None,
     video: Path | None = None,
     steps_per_second: float = 10.0,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Open a run's recording in the rerun viewer, or make a picture or a film of it.
 
@@ -34,7 +34,7 @@ def play(
         screenshot: Write a picture (.png) of the viewer instead, without a display.
         video: Write a film (.mp4 or .gif) of the walk instead.
         steps_per_second: Its speed.
-        progress: Called with how many steps of the film are drawn, of how many.
+        progress: Called with how many steps of the film are drawn, of how many; None prints a line where it takes long, `no_progress` none.
 
     Raises:
         FileError: Where there is no recording.

@@ -13,7 +13,7 @@ from typing import Any
 from tussock.render.images.source import DatabaseViews
 from tussock.world.atomic import replacing
 from tussock.world.errors import FileError
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 from tussock.world.route_files import write_route
 
 from ..experiment import Experiment, TrainedNavigator
@@ -34,8 +34,8 @@ def record_run(
     *,
     overwrite: bool = False,
     viewer: str | None = None,
-    learning: Progress = no_progress,
-    walking: Progress = no_progress,
+    learning: Progress | None = None,
+    walking: Progress | None = None,
 ) -> dict[str, Any]:
     """Learn a route, walk it, and leave the walk in a folder.
 
@@ -46,8 +46,8 @@ def record_run(
         out: The folder.
         overwrite: Replace the run that the folder holds.
         viewer: Address of a running viewer to stream to as well.
-        learning: Called with how many training views are drawn, of how many.
-        walking: Called with how many steps are made, of how many there may be.
+        learning: Called with how many training views are drawn, of how many; None prints a line where it takes long, `no_progress` none.
+        walking: Called with how many steps are made, of how many there may be; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The summary of the walk (see `Trajectory.summary`). Its seconds are those of the walk with its diagnosis and its
@@ -56,6 +56,8 @@ def record_run(
     Raises:
         InputError: Where the folder is taken or cannot be written, and for what the experiment refuses.
     """
+    learning = printed(learning, "learning", "views")
+    walking = printed(walking, "walking", "steps")
     out = Path(out)
     given = (experiment.world, experiment.route, experiment.route_database, experiment.grid_database)
     files = [Path(each) for each in given if isinstance(each, str | Path)]

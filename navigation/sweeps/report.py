@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from tussock.world.errors import FileError
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from ..experiment_settings import TYPES, default_settings
 from ..failures import Cause
@@ -46,13 +46,13 @@ WALKS = (
 FOOTER = "All numbers are in report.json, every run is in runs.parquet. docs/failures.md explains the causes and their limits."
 
 
-def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_progress) -> dict[str, Any]:
+def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress | None = None) -> dict[str, Any]:
     """Write report.html, report.json and the figures of a sweep into its folder. The sweep may still run.
 
     Args:
         folder: Folder of the sweep.
         worst: Number of worst walks to show.
-        progress: Called with the numbers of figures drawn and of all figures.
+        progress: Called with the numbers of figures drawn and of all figures; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The content of report.json.
@@ -60,6 +60,7 @@ def write_sweep_report(folder: Path, *, worst: int = 5, progress: Progress = no_
     Raises:
         FileError: The folder holds no finished run, or a replication.
     """
+    progress = printed(progress, "drawing", "figures")
     if (folder / REPLICATION_RESULTS).exists():
         raise FileError(f"{folder} holds a replication, with its own {REPORT}; give the folder of a sweep")
     with Store(folder, read_only=True) as store:

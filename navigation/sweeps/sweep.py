@@ -21,7 +21,7 @@ from distributed.comm.core import CommClosedError
 from tussock.render.cores import core_count
 from tussock.render.eye import Eye
 from tussock.world.errors import FileError, InputError, MissingDependencyError, first_line
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, no_progress, printed
 
 from ..experiment import Experiment
 from ..experiment_keys import Keys
@@ -55,7 +55,7 @@ LOCAL: dict[str, Any] = {  # options of the workers on this machine, which nobod
 
 
 def run_sweep(
-    sweep: Sweep, out: Path, *, workers: str | int | None = None, progress: Progress = no_progress
+    sweep: Sweep, out: Path, *, workers: str | int | None = None, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Do the runs of a sweep that the folder does not hold yet, keeping each as soon as it is finished.
 
@@ -64,7 +64,7 @@ def run_sweep(
         out: The folder.
         workers: Address of a running Dask scheduler, whose workers do the runs; or the number of workers that are started on this
             machine, for this sweep alone; None means one for each core.
-        progress: Called with how many runs are finished, of how many.
+        progress: Called with how many runs are finished, of how many; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         What `tussock sweep --json` prints.
@@ -72,6 +72,7 @@ def run_sweep(
     Raises:
         InputError: Where another sweep writes to the folder, and where runs could not be finished; all others are kept.
     """
+    progress = printed(progress, "walking", "runs")
     began = time.perf_counter()
     runs = _by_key(sweep)
     with Store(out) as store:
@@ -275,11 +276,10 @@ def worst_of(table: pd.DataFrame, count: int) -> list[str]:
 def record_again(experiment: Experiment, row: dict[str, Any], out: Path) -> None:
     """Repeat a finished run with a recording, unless there is one. Raises InputError where its result differs."""
     names, summary = ("arrived", "steps", "mean_deviation_m", "resets"), out / "summary.json"
-    if summary.exists():
-        recorded = json.loads(summary.read_text(encoding="utf-8"))
-        if all(recorded.get(name) == row[name] for name in names):
-            return
-    recorded = record_run(experiment, out, overwrite=True)
+    recorded = json.loads(summary.read_text(encoding="utf-8")) if summary.exists() else {}
+    if all(recorded.get(name) == row[name] for name in names):
+        return
+    recorded = record_run(experiment, out, overwrite=True, learning=no_progress, walking=no_progress)
     different = [name for name in names if recorded[name] != row[name]]
     if different:
         shutil.rmtree(out)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tussock.world.atomic import check_writable, replacing
 from tussock.world.errors import FileError, SettingError
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from .camera import Camera
 from .database import check_new, make_folder
@@ -29,7 +29,7 @@ def unwrap_files(
     suffix: str = ".png",
     quality: int = 80,
     drawing: Path | None = None,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> tuple[Unwrapping, int]:
     """Make panoramas of the pictures of one camera. A folder that an interrupted call left is completed.
 
@@ -41,7 +41,8 @@ def unwrap_files(
         suffix: Of the files in a folder: ".png" or ".jpg".
         quality: Of JPEG images.
         drawing: File (.png) for the first picture with the ring drawn on it, or None.
-        progress: Called now and then with the number of panoramas that are done, and of all.
+        progress: Called now and then with the number of panoramas that are done, and of all; None prints a line where it takes long,
+            `no_progress` none.
 
     Returns:
         How they were made, and how many.
@@ -49,6 +50,7 @@ def unwrap_files(
     Raises:
         InputError: Anything cannot be read, or `out` is complete or holds anything else.
     """
+    progress = printed(progress, "unwrapping", "pictures")
     single = os.path.isfile(source) and not is_video_file(source)
     folder, references = _chosen(source, every, single)
     files = _files(out, source, references, single, suffix)

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
 
 from ..eye import Eye
@@ -79,7 +79,7 @@ def write_database(
     folder: str | os.PathLike,
     renderer: Renderer,
     poses: Poses | Grid,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> tuple[Database, int]:
     """Draw the views at the poses of a route, or of a grid, into a folder.
 
@@ -90,7 +90,8 @@ def write_database(
         folder: A new or empty folder, or one to complete.
         renderer: Draws the views, at `stored_poses` of the poses. They are saved as RGBA.
         poses: (n, 3) x (m), y (m) and heading (rad), or a grid.
-        progress: Called now and then with the number of views that are done, and of all.
+        progress: Called now and then with the number of views that are done, and of all; None prints a line where it takes long,
+            `no_progress` none.
 
     Returns:
         The database, and how many views were drawn by this call.
@@ -98,6 +99,7 @@ def write_database(
     Raises:
         InputError: The folder holds anything else. Then nothing is changed.
     """
+    progress = printed(progress, "drawing", "views")
     folder, grid = Path(folder), poses if isinstance(poses, Grid) else None
     stored = stored_poses(poses.poses() if isinstance(poses, Grid) else poses)
     columns = _columns(stored, renderer.eye.z, grid)

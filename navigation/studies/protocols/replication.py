@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from tussock.world.progress import Progress, no_progress
+from tussock.world.progress import Progress, printed
 
 from ...reports.claims import Outcome, check_claims, count_outcomes
 from ...reports.report import (
@@ -49,7 +49,7 @@ def replicate(
     about: dict[str, Any],
     command: str,
     workers: str | int | None = None,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Do the runs that a folder does not have yet, and write the report.
 
@@ -60,7 +60,7 @@ def replicate(
         about: The choices made, for the head of the report.
         command: Command line that repeats all of it.
         workers: What does the runs; see `run_sweep`.
-        progress: Called with the numbers of finished and of all runs.
+        progress: Called with the numbers of finished and of all runs; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The result of `tussock replicate`.
@@ -69,6 +69,7 @@ def replicate(
         SettingError: A model has no walk at all.
         InputError: For the same reasons as `run_sweep`.
     """
+    progress = printed(progress, "walking", "runs")
     done = run_sweep(sweep, out, workers=workers, progress=progress)
     walks, left_out = walks_of(protocol, sweep, out)
     results = protocol.measure(walks)
@@ -98,7 +99,7 @@ def measure_images(
     seed: int,
     about: dict[str, Any],
     command: str,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Measure what a protocol measures on published images, and write the report.
 
@@ -109,7 +110,7 @@ def measure_images(
         seed: Of everything random.
         about: The choices made, for the head of the report.
         command: Command line that repeats all of it.
-        progress: Called with how much is done, of how much.
+        progress: Called with how much is done, of how much; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The result of `tussock replicate`.
@@ -117,6 +118,7 @@ def measure_images(
     Raises:
         FileError: The images are missing or damaged.
     """
+    progress = printed(progress, "comparing", "sets")
     return _compute(protocol, lambda: protocol.measure(folder, seed, progress), out, about=about, command=command)
 
 
@@ -128,7 +130,7 @@ def compute(
     quick: bool,
     about: dict[str, Any],
     command: str,
-    progress: Progress = no_progress,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Do a protocol that needs neither a world nor images, and write the report.
 
@@ -139,11 +141,12 @@ def compute(
         quick: A first look.
         about: The choices made, for the head of the report.
         command: Command line that repeats all of it.
-        progress: Called with how much is done, of how much.
+        progress: Called with how much is done, of how much; None prints a line where it takes long, `no_progress` none.
 
     Returns:
         The result of `tussock replicate`.
     """
+    progress = printed(progress, "computing", "parts")
     return _compute(protocol, lambda: protocol.measure(seed, quick, progress), out, about=about, command=command)
 
 
