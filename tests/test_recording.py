@@ -23,12 +23,15 @@ from rerun.chunk import RrdReader
 from tussock.navigation.agent import Agent
 from tussock.navigation.displacement import Displacement
 from tussock.navigation.encoding import Encoding
+from tussock.navigation.failures import Cause, Diagnosis
 from tussock.navigation.models import PerfectMemory
 from tussock.navigation.recording import log
 from tussock.navigation.recording.blueprint import OF_A_SCAN, Shown
 from tussock.navigation.recording.columns import image_columns
 from tussock.navigation.recording.log import Recording
+from tussock.navigation.recording.marks import Marks
 from tussock.navigation.recording.playback import play
+from tussock.navigation.recording.recorded_walk import read_walk
 from tussock.navigation.recording.signals import HISTORY
 from tussock.navigation.recording.viewer import viewer_program
 from tussock.navigation.steering.navigator import Motion
@@ -38,6 +41,7 @@ from tussock.navigation.walk import Walk
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import DiskFullError, FileError, InputError, MissingDependencyError
+from tussock.world.geometry import Pose
 from tussock.world.routes import generate_route
 from tussock.world.scene import World
 
@@ -49,6 +53,8 @@ PER_STEP = {  # columns with a row for each step, but for the path, which has no
     "/view@Image:buffer",
     "/recognised@Image:buffer",
     "/familiarity@BarChart:values",
+    "/familiarity/chosen@BarChart:values",
+    "/error/guides@Scalars:scalars",
     "/deviation/m@Scalars:scalars",
     "/error/degrees@Scalars:scalars",
 }
@@ -165,7 +171,11 @@ def test_what_is_recorded_is_what_the_agent_sees_and_recognises(agent, tmp_path,
         for step in steps:
             recording.log(step)
     images = {name: values_in(tmp_path / "r.rrd", f"/{name}@Image:buffer") for name in ("view", "recognised")}
-    charts = values_in(tmp_path / "r.rrd", "/familiarity@BarChart:values")
+    charts, not_compared, chosen = (
+        values_in(tmp_path / "r.rrd", f"/familiarity{which}@BarChart:values")
+        for which in ("", "/not_compared", "/chosen")
+    )
+    degrees_right = read_walk(tmp_path / "r.rrd").degrees
     assert [*charts] == [*images["view"]] == [*images["recognised"]] == [step.index for step in steps]
     for step in steps:
         assert step.view is not None
@@ -178,7 +188,12 @@ def test_what_is_recorded_is_what_the_agent_sees_and_recognises(agent, tmp_path,
         chart = np.array(charts[step.index]["buffer"], dtype=np.float32)
         assert charts[step.index]["shape"] == [len(more)]
         assert np.isclose(chart[ahead - 1 : ahead + 1], more[0]).any()  # ahead is the middle
-        assert np.array_equal(np.sort(chart), np.sort(more))
+        assert np.array_equal(np.sort(chart), np.sort(np.where(step.scanned, more, 0)))
+        others = np.array(not_compared[step.index]["buffer"], dtype=np.float32)
+        assert np.array_equal(np.sort(others), np.sort(np.where(step.scanned, 0, more)))
+        (at,) = np.flatnonzero(chosen[step.index]["buffer"])
+        assert chosen[step.index]["buffer"][at] == chart[at] == chart.max()
+        assert abs(np.radians(degrees_right[at]) + step.aim) <= np.pi / len(more)
 
 
 def test_views_without_alpha_are_recorded_as_the_eye_sees_them(tmp_path):
@@ -231,6 +246,46 @@ def test_a_recording_opens_in_the_viewer(agent, recorded, tmp_path):
     sky = np.array(agent.renderer.world.sky_rgb)[::-1]
     assert (np.abs(views.astype(int) - sky).max(axis=-1) <= 2).mean() > 0.05  # the panoramas are shown
     assert [path.name for path in tmp_path.iterdir()] == ["viewer.png"]
+    early = [tmp_path / f"{k}.png" for k in (3, 3, 20)]
+    for path, step in zip(early, (3, 3, 20), strict=True):
+        play(recorded[0], screenshot=path, step=step)
+    panels = [cv2.imread(str(path))[height // 25 : height // 3, : width // 2] for path in early]
+    assert np.array_equal(panels[0], panels[1])
+    assert (panels[0] != panels[2]).mean() > 0.01  # what the agent sees at another step
+    assert (panels[0] != views).mean() > 0.01
+
+
+def test_a_step_that_there_is_not_is_refused(recorded, tmp_path):
+    with pytest.raises(InputError, match=r"--step 1000: .+ has the steps 0 to "):
+        play(recorded[0], screenshot=tmp_path / "viewer.png", step=1000)
+    with pytest.raises(InputError, match="give --screenshot"):
+        play(recorded[0], step=3)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_cluster_of_marks_has_one_label(agent):
+    """Whatever their causes: two labels in one place cannot be read."""
+    (step,) = islice(agent.walk(agent.start()), 1)
+    sent = []
+    marks = Marks(lambda entity, steps, columns: sent.extend(columns))
+    aliasing = Diagnosis(covered=0.0, nearest=0.0, recognised=2.0, error=1.0, turning=0.0)
+    occlusion, corner = (
+        dataclasses.replace(aliasing, covered=1.0),
+        dataclasses.replace(aliasing, recognised=0.0, turning=2.0),
+    )
+    places = [0.0, 0.05, 0.1, 2.0]
+    steps = [
+        (dataclasses.replace(step, index=k, pose=Pose(x, 0.0, 0.0)), diagnosis)
+        for k, (x, diagnosis) in enumerate(zip(places, (aliasing, occlusion, aliasing, corner), strict=True))
+    ]
+    marks.write(steps)
+    labels = [
+        label
+        for column in sent
+        if column.component_descriptor().component == "Points3D:labels"
+        for label in column.as_arrow_array().flatten().to_pylist()
+    ]
+    assert sorted(filter(None, labels)) == sorted([Cause.ALIASING.value, Cause.CORNER.value])
 
 
 KILLED = """
@@ -385,14 +440,17 @@ def panels_of(recording: Path) -> set[str]:
 
 PANELS = {
     "The learned view it recognises",
-    "Familiarity by degrees to the right",
+    "Familiarity above the least, by degrees to the right (red: turned there, grey: not compared)",
     "What it steers by",
     "Distance from the goal (m)",
 }
 
 
 def test_there_are_panels_for_what_there_is_only(agent, recorded, tmp_path):
-    assert panels_of(recorded[0]) == {"The learned view it recognises", "Familiarity by degrees to the right"}
+    assert panels_of(recorded[0]) == {
+        "The learned view it recognises",
+        "Familiarity above the least, by degrees to the right (red: turned there, grey: not compared)",
+    }
     (step, *_) = agent.walk(agent.start())
     nothing = Shown()
     assert nothing.with_step(step, learned=True) == OF_A_SCAN

@@ -260,6 +260,8 @@ class PlayCommand(Command):
     """Serve the viewer to a browser on this machine instead of opening a window."""
     screenshot: Path | None = None
     """Save a picture (.png) of the viewer instead, without a display."""
+    step: int | None = None
+    """The step that the picture shows. Default: the last one."""
     video: Path | None = None
     """Save a film of the walk instead: .mp4 (needs pip install imageio-ffmpeg), or .gif."""
     steps_per_second: float = 10.0
@@ -269,12 +271,13 @@ class PlayCommand(Command):
         from ..recording.playback import play
 
         if self.video is None:
-            return play(self.run_folder, web=self.web, screenshot=self.screenshot)
+            return play(self.run_folder, web=self.web, screenshot=self.screenshot, step=self.step)
         with progress("drawing", "steps") as report:
             return play(
                 self.run_folder,
                 web=self.web,
                 screenshot=self.screenshot,
+                step=self.step,
                 video=self.video,
                 steps_per_second=self.steps_per_second,
                 progress=report,

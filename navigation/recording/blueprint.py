@@ -11,8 +11,8 @@ from tussock.world.geometry import Route
 from ..failures import Cause
 from ..walker import Step
 from .signals import LINES, MAPS, entity, line_names, map_names, ways
+from .viewer import TIMELINE
 
-TIMELINE = "step"
 CAUSE_COLOURS = {  # as on dark grey, in which names are written
     Cause.OCCLUSION: (185, 130, 255), Cause.OFF_CATCHMENT: (255, 255, 255), Cause.ALIASING: (255, 110, 205),
     Cause.UNLEARNED: (255, 225, 0), Cause.CORNER: (0, 225, 225), Cause.UNEXPLAINED: (185, 185, 185),
@@ -89,7 +89,7 @@ def _agent_views(max_deviation: float, shown: Shown) -> rrb.Vertical:
         views.append((1.3, rrb.Spatial2DView(origin="recognised", name="The learned view it recognises")))
     if shown.scan:
         hidden = rrb.PlotLegend(visible=False)
-        name = "Familiarity by degrees to the right"
+        name = "Familiarity above the least, by degrees to the right (red: turned there, grey: not compared)"
         views.append((1, rrb.BarChartView(origin="familiarity", name=name, plot_legend=hidden)))
     if shown.lines:
         legend = rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)
@@ -101,7 +101,7 @@ def _agent_views(max_deviation: float, shown: Shown) -> rrb.Vertical:
         ]
         views.append((1.3, rrb.Horizontal(*maps)))
     views.append((1, _curve("deviation", "Deviation from the route (m)", (0.0, max_deviation))))
-    views.append((1, _curve("error", "Heading error (degrees)", (-90.0, 90.0))))
+    views.append((1, _curve("error", "Heading error (degrees; grey: 45 to either side)", (-90.0, 90.0))))
     if not shown.scan:
         views.append((1, _curve("goal", "Distance from the goal (m)", None)))
     shares, panels = zip(*views, strict=True)

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float, Int64
+from jaxtyping import Float
 
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
-from tussock.world.geometry import Route, turn_of_columns
+from tussock.world.geometry import Route
 from tussock.world.scene import World
 
 from ..failures import Diagnosis
@@ -26,14 +26,16 @@ from ..stopping import StopReason
 from ..training import training_source
 from ..walker import Step
 from . import disk
-from .blueprint import MARKS, OF_A_SCAN, TIMELINE, Shown, blueprint, image_format
-from .columns import bar_chart_columns, image_columns
+from .blueprint import MARKS, OF_A_SCAN, Shown, blueprint, image_format
+from .columns import image_columns
 from .marks import Marks, ends_of_scale, events_of, scale
+from .scans import ScanLog
 from .signals import SignalLog
-from .viewer import check_viewer
+from .viewer import TIMELINE, check_viewer
 
 ROUTE_COLOUR, LEARNED_COLOUR, PATH_COLOUR, MATCH_COLOUR = (60, 120, 255), (150, 190, 255), (235, 60, 50), (250, 170, 30)
 VIEW_COLOUR = (130, 130, 130)  # of the positions of an image database
+GUIDES, GUIDE_COLOUR = "error/guides", (90, 90, 90)  # lines at 45 degrees to the left and right
 FLUSH_SECONDS = 0.5  # how often steps are brought to disk; a crash may lose those of twice as long
 BATCH = 32  # steps whose views are sent at once: fresh memory for more of them takes longer than copying them
 ABOVE = 0.015  # m; lines on the ground are drawn this high to stay visible
@@ -72,7 +74,8 @@ class Recording:
         self._waiting: list[tuple[Step, Diagnosis | None]] = []  # and those of which it has sent only the views
         self._previous: Step | None = None
         self._touching = False  # whether an obstacle stopped or turned the step before the last look
-        self._marks, self._signals = Marks(self._send), SignalLog(self._send, self._log)
+        self._marks = Marks(self._send)
+        self._scans, self._signals = ScanLog(self._send, self._log), SignalLog(self._send, self._log)
         self._route, self._max_deviation = route, max_deviation
         self._shown, self._layout = Shown(), OF_A_SCAN  # what the steps have, and what is laid out
         self._streams = [rr.RecordingStream("tussock")]
@@ -196,6 +199,7 @@ class Recording:
         names = {"deviation/m": "deviation from the route (m)", "error/degrees": "heading error (degrees)"}
         for (entity, name), colour in zip(names.items(), (PATH_COLOUR, MATCH_COLOUR), strict=True):
             self._log(entity, rr.SeriesLines(names=name, colors=colour), static=True)
+        self._log(GUIDES, rr.SeriesLines(colors=[GUIDE_COLOUR] * 2, names=["45 left", "45 right"]), static=True)
         for entity, colour in MARKS.items():
             self._log(entity, rr.Points3D.from_fields(colors=colour, radii=0.03), static=True)
 
@@ -210,12 +214,6 @@ class Recording:
         if step.match is not None and self._training_poses is not None:
             self._log("recognised", pixels, static=True)
             self._log("world/recognised", rr.Arrows3D.from_fields(colors=MATCH_COLOUR, radii=0.008), static=True)
-        if step.familiarity is not None:
-            width = len(step.familiarity)
-            degrees_right = -np.degrees(turn_of_columns(_left_to_right(width), width))
-            chart = rr.BarChart(step.familiarity, abscissa=degrees_right, color=MATCH_COLOUR).as_component_batches()
-            constant = [each for each in chart if each.component_descriptor().component != "BarChart:values"]
-            self._log("familiarity", constant, static=True)
 
     def _send_steps(self, steps: list[Step]) -> None:
         """What changes from step to step, but for the views."""
@@ -233,15 +231,12 @@ class Recording:
             self._send("world/recognised", matched, arrows)
         self._send("deviation/m", steps, rr.Scalars.columns(scalars=[step.deviation for step in steps]))
         self._send("error/degrees", steps, rr.Scalars.columns(scalars=np.degrees([step.error for step in steps])))
+        guides = np.tile([45.0, -45.0], len(steps))
+        self._send(GUIDES, steps, rr.Scalars.columns(scalars=guides).partition([2] * len(steps)))
         self._send("goal/m", steps, rr.Scalars.columns(scalars=[step.goal_distance for step in steps]))
         self._send("looks/headings", steps, rr.Scalars.columns(scalars=[step.looks for step in steps]))
         self._signals.write(steps, {step.index: _place(step) for step in steps})
-        scans = [(step, step.familiarity) for step in steps if step.familiarity is not None]
-        if scans:
-            charts = np.stack([familiarity for _, familiarity in scans])
-            # A bar chart stands on zero: show how much more familiar each heading is than the least familiar one.
-            charts = charts[:, _left_to_right(charts.shape[1])] - charts.min(axis=1, keepdims=True)
-            self._send("familiarity", [step for step, _ in scans], bar_chart_columns(charts))
+        self._scans.write(steps)
         self._previous = steps[-1]
 
     def _send_views(self, steps: list[Step]) -> None:
@@ -287,8 +282,3 @@ def _place(step: Step, above: float = ABOVE) -> tuple[float, float, float]:
 
 def _directions(headings: Float[np.ndarray, " n"], length: float) -> Float[np.ndarray, "n 3"]:
     return length * np.column_stack([np.cos(headings), np.sin(headings), np.zeros(len(headings))])
-
-
-def _left_to_right(width: int) -> Int64[np.ndarray, " width"]:
-    """Rotations in the order of the headings that they look to, from left to right."""
-    return np.argsort(-turn_of_columns(np.arange(width), width))

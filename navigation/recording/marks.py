@@ -1,5 +1,6 @@
 """Marks in the world where something happens to an agent, and the events of a step as text."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,7 +16,7 @@ from .signals import Send
 
 MARKS_ABOVE = 0.04  # m; marks are drawn this high above the ground, and above all lines
 SCALE_COLOUR, SCALE_BELOW = (255, 255, 255), 0.1  # of the line of a metre, and how far south of the route it is (m)
-LABEL_SPACING = 0.6  # m; marks of one cause nearer than this to the one with its name have none
+LABEL_SPACING = 0.6  # m; marks nearer than this to one with a name have none
 
 
 def mark_place(step: Step, above: float = MARKS_ABOVE) -> tuple[float, float, float]:
@@ -28,7 +29,7 @@ class Marks:
 
     def __init__(self, send: Send):
         self._send = send
-        self._labelled: tuple[Cause, Pose] | None = None  # the cause that was last written at its mark, and where
+        self._labelled: list[Pose] = []  # where a cause is written at its mark
 
     def write(self, steps: list[tuple[Step, Diagnosis | None]]) -> None:
         """Mark where some steps are poor or failed, where obstacles stopped or turned them, and where the agent was carried."""
@@ -43,11 +44,10 @@ class Marks:
         """A mark where a step is poor or failed, in the colour of its cause; the first of several close marks has its name."""
         marks: dict[Cause, list[tuple[Step, str]]] = {}
         for step, diagnosis in poor:
-            cause = diagnosis.cause
-            last, where = self._labelled or (None, step.pose)
-            close = last == cause and np.hypot(step.pose.x - where.x, step.pose.y - where.y) < LABEL_SPACING
-            marks.setdefault(cause, []).append((step, "" if close else cause.value))
-            self._labelled = self._labelled if close else (cause, step.pose)
+            close = any(math.dist(step.pose[:2], where[:2]) < LABEL_SPACING for where in self._labelled)
+            marks.setdefault(diagnosis.cause, []).append((step, "" if close else diagnosis.cause.value))
+            if not close:
+                self._labelled.append(step.pose)
         for cause, marked in marks.items():
             steps, labels = [step for step, _ in marked], [label for _, label in marked]
             positions = [mark_place(step) for step in steps]

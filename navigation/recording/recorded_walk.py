@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from tussock.world.errors import FileError, first_line
 
-from .blueprint import TIMELINE
+from .viewer import TIMELINE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class RecordedWalk:
         deviations: (n,) Distance from the route (m).
         walked: (n,) Whether it walked there from the step before; not at the first step, and where it was carried or put back.
         views: What it saw, by the number of the step.
-        familiarity: Of the headings that it compared, from left to right, by the number of the step.
+        familiarity: Of all headings, from left to right, above the least one, by the number of the step.
         degrees: (rotations,) Of these headings to the right of where it faced; empty where it does not scan.
         route: (k, 2) The route (m).
         triangles: (m, 3, 3) Of the world (m).
@@ -66,6 +66,7 @@ def read_walk(recording: Path) -> RecordedWalk:
     facing = rows("/world/agent:Arrows3D:vectors", 2)
     degrees = constant.get("/familiarity:BarChart:abscissa")
     charts = {} if degrees is None else timed.get("/familiarity:BarChart:values", {})
+    others = timed.get("/familiarity/not_compared:BarChart:values", {})  # it is 0 in one of the two
     path = timed.get("/world/path:LineStrips3D:strips", {})
     triangles, rgb = _mesh(constant)
     return RecordedWalk(
@@ -74,7 +75,7 @@ def read_walk(recording: Path) -> RecordedWalk:
         facing=facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9),
         deviations=rows("/deviation/m:Scalars:scalars", 1)[:, 0],
         views={k: _numbers(pixels).reshape(shape) for k, pixels in timed.get("/view:Image:buffer", {}).items()},
-        familiarity={k: _chart(values) for k, values in charts.items()},
+        familiarity={k: _chart(values) + (_chart(others[k]) if k in others else 0) for k, values in charts.items()},
         degrees=_chart(degrees) if charts else np.empty(0),
         walked=np.array([k in path for k in steps.tolist()]),
         route=_numbers(constant["/world/route:LineStrips3D:strips"]).reshape(-1, 3)[:, :2],

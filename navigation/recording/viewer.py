@@ -14,6 +14,8 @@ from urllib.parse import urlsplit
 from tussock.world.atomic import replacing
 from tussock.world.errors import MissingDependencyError
 
+TIMELINE = "step"  # of recordings
+
 
 def check_viewer(url: str) -> None:
     """Raise MissingDependencyError where no viewer listens."""
@@ -26,12 +28,13 @@ def check_viewer(url: str) -> None:
         ) from error
 
 
-def save_screenshot(recording: Path, picture: Path, *, seconds: float = 60.0) -> None:
+def save_screenshot(recording: Path, picture: Path, *, step: int | None = None, seconds: float = 60.0) -> None:
     """Save what the viewer shows of a recording, once it shows all of it. Needs no display.
 
     Args:
         recording: The `.rrd` file.
         picture: The PNG to write.
+        step: What it shows; None means the last one.
         seconds: Limit of the time that it may take.
 
     Raises:
@@ -54,7 +57,10 @@ def save_screenshot(recording: Path, picture: Path, *, seconds: float = 60.0) ->
                 )
             time.sleep(0.5)
             try:
-                ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(partial.absolute()))
+                client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+                if step is not None:
+                    client.set_time(TIMELINE, sequence=step, play_state="paused")
+                client.save_screenshot(str(partial.absolute()))
                 earlier.append(partial.read_bytes())
             except (ConnectionError, OSError, RuntimeError, ValueError):
                 continue  # not up yet
