@@ -8,7 +8,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
+from jaxtyping import UInt8
 
 WIDTHS = (390, 1400)  # of a telephone and of a desk, in pixels
 
@@ -22,14 +25,32 @@ PROBE = """<script>addEventListener("load", () => {
 });</script>"""
 
 
-def in_browser(page: Path, width: int, folder: Path) -> dict[str, Any]:
-    """Show a page in chromium, `width` pixels wide: how many pictures it has, how many are broken, what is wider than the page, how
-    many texts are too small to read. folder: an empty one to work in. Fails where the page writes to the console.
-    """
+def chromium() -> str:
+    """The browser; without it, the test is skipped."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None and not os.environ.get("TUSSOCK_REQUIRE_GL"):
         pytest.skip("chromium is not installed (Debian: chromium)")
     assert browser is not None
+    return browser
+
+
+def screenshot_of(address: str, folder: Path, seconds: int) -> UInt8[np.ndarray, "h w 3"]:
+    """What chromium shows of a page that draws with WebGL, these seconds after it was opened, by its clock. folder: to work in."""
+    picture = folder / "page.png"
+    subprocess.run(
+        [chromium(), "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+         "--no-first-run", "--disable-background-networking", f"--user-data-dir={folder / 'profile'}", "--window-size=1400,900",
+         f"--virtual-time-budget={1000 * seconds}", f"--screenshot={picture}", address],
+        capture_output=True, timeout=240, check=True,
+    )  # fmt: skip
+    return cv2.imread(str(picture))
+
+
+def in_browser(page: Path, width: int, folder: Path) -> dict[str, Any]:
+    """Show a page in chromium, `width` pixels wide: how many pictures it has, how many are broken, what is wider than the page, how
+    many texts are too small to read. folder: an empty one to work in. Fails where the page writes to the console.
+    """
+    browser = chromium()
     probed = folder / "probed.html"
     probed.write_text(page.read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"), encoding="utf-8")
     frame = folder / "frame.html"  # a frame is as narrow as it is told to be; a window is not

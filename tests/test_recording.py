@@ -18,6 +18,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from browser import screenshot_of
+from commands import TUSSOCK, Process
 from rerun.chunk import RrdReader
 
 from tussock.navigation.agent import Agent
@@ -253,6 +255,25 @@ def test_a_recording_opens_in_the_viewer(agent, recorded, tmp_path):
     assert np.array_equal(panels[0], panels[1])
     assert (panels[0] != panels[2]).mean() > 0.01  # what the agent sees at another step
     assert (panels[0] != views).mean() > 0.01
+
+
+@pytest.mark.slow
+def test_a_recording_opens_in_a_browser_and_its_one_address_is_printed(agent, recorded, tmp_path):
+    serving = Process([TUSSOCK, "play", recorded[0], "--web"], stderr=subprocess.PIPE, text=True)
+    with serving:
+        assert serving.stderr is not None
+        assert "until Ctrl-C" in serving.stderr.readline()
+        address = serving.stderr.readline().strip()
+        sky = np.array(agent.renderer.world.sky_rgb)[::-1]
+        for seconds in (30, 100, 300, 1000):  # its own clock goes on while the machine is busy
+            picture = screenshot_of(address, tmp_path, seconds)
+            drawn = (np.abs(picture.astype(int) - sky).max(axis=-1) <= 2).mean() > 0.02  # the panoramas
+            if drawn:
+                break
+        assert drawn
+        serving.send_signal(signal.SIGINT)
+        assert serving.wait(timeout=30) == 0
+        assert serving.stderr.read() == ""
 
 
 def test_a_step_that_there_is_not_is_refused(recorded, tmp_path):

@@ -42,7 +42,7 @@ def share_different(a: np.ndarray, b: np.ndarray) -> float:
     return float((a != b).any(axis=-1).mean())
 
 
-@pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub", "tiny"])
+@pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub", "hay-meadow", "woodland", "tiny"])
 def test_equals_embree_in_generated_worlds(preset):
     world = World.generate(preset, seed=3)
     rng = np.random.default_rng(0)

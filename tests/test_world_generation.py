@@ -26,7 +26,7 @@ from tussock.world.routes import clearance, generate_route
 from tussock.world.scene import Ground, World
 from tussock.world.settings import describe
 
-KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree"}
+KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree", "herb", "culm", "litter", "inner_tree"}
 PRESETS = {name: WORLDS.find(name)() for name in params.PRESETS}
 
 
@@ -85,6 +85,8 @@ def rounded(*arrays) -> str:
         ("meadow", 5, "c1512b59599e", 1, 8.0, None, "871cdc715564"),
         ("scrub", 5, "700445762445", 1, 8.0, None, "1edbab5cb472"),
         ("tiny", 5, "76b543786054", 1, 8.0, None, "acd623f325ac"),
+        ("hay-meadow", 5, "?", 1, 8.0, None, "?"),
+        ("woodland", 5, "?", 1, 8.0, None, "?"),
         ("meadow flower_share=1 grass_height=0.14 field_depth=4", 2, "f93518b80c0f", 3, 4.0, None, "26d410f2c95c"),
         ("tussock-field field_width=18 field_depth=14", 1, "dc47bb3c69c3", 2, 12.0, None, "b05323666b9d"),
         ("scrub", 6, "38a27787c532", 1, 3.0, (3.25, 4.25), "94d931989501"),
@@ -209,6 +211,9 @@ INVALID = {
     "dry_share": (1.2,),
     "sky_rgb": ([300, 0, 0], [1, 2], "blue", 3),
     "haze": (None,),
+    "speckle": (-0.1, 1.5),
+    "tree_forks": (5, 1.5),
+    "litter_density": (501,),
 }
 
 
@@ -419,7 +424,15 @@ def test_the_cheapest_path_is_that_of_a_search_in_the_whole_field(preset):
 
 @pytest.mark.parametrize(
     ("preset", "seed"),
-    [*(("tussock-field", s) for s in range(2)), ("meadow", 1), ("scrub", 1), ("tiny", 1), ("tiny", 2)],
+    [
+        *(("tussock-field", s) for s in range(2)),
+        ("meadow", 1),
+        ("scrub", 1),
+        ("tiny", 1),
+        ("tiny", 2),
+        ("hay-meadow", 1),
+        ("woodland", 1),
+    ],
 )
 def test_a_route_is_smooth_and_clear_of_obstacles(preset, seed):
     world = generated(preset, 3)

@@ -1,15 +1,13 @@
 """Playing a run's recording back. Light to import: without torch, and without what makes recordings."""
 
 import logging
-import os
-import sys
 from pathlib import Path
 from typing import Any
 
 from tussock.world.errors import FileError, MissingDependencyError, SettingError
 from tussock.world.progress import Progress
 
-from .viewer import save_screenshot, watch
+from .viewer import has_display, save_screenshot, serve, watch
 
 RECORDING = "recording.rrd"
 UNFINISHED = "UNFINISHED.txt"  # is in the folder of a run until all else is
@@ -64,11 +62,14 @@ def play(
 
         steps = save_film(recording, video, steps_per_second=steps_per_second, progress=progress)
         return {"recording": str(recording), "video": str(video), "steps": steps}
-    if not web and sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if web:
+        serve(recording)
+    elif has_display():
+        watch(recording)
+    else:
         raise MissingDependencyError(
             "there is no display here; add --web to watch in a browser, --screenshot FILE.png or --video FILE.mp4"
         )
-    watch(recording, web=web)
     return {"recording": str(recording)}
 
 

@@ -1,20 +1,25 @@
 """The rerun viewer: in a window, in a browser, or as a picture."""
 
+import logging
 import os
 import shutil
 import socket
 import subprocess
+import sys
 import time
+import webbrowser
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from tussock.world.atomic import replacing
 from tussock.world.errors import MissingDependencyError
 
 TIMELINE = "step"  # of recordings
+
+log = logging.getLogger(__name__)
 
 
 def check_viewer(url: str) -> None:
@@ -42,9 +47,7 @@ def save_screenshot(recording: Path, picture: Path, *, step: int | None = None, 
     """
     from rerun.experimental import ViewerClient  # late: `watch` needs only the viewer's program
 
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = _free_port()
     options = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000", str(recording)]
     until = time.monotonic() + seconds
     # The viewer loads in the background and gives no sign when it is done: it is done when its picture stays the same.
@@ -66,14 +69,63 @@ def save_screenshot(recording: Path, picture: Path, *, step: int | None = None, 
                 continue  # not up yet
 
 
-def watch(recording: Path, *, web: bool = False) -> None:
-    """Open a recording in the viewer and wait until it is closed: a window, or a page served to browsers on this machine only."""
-    options = ["--bind", "127.0.0.1", str(recording), *(["--web-viewer"] if web else [])]
-    with _viewer(options) as viewer:
+def watch(recording: Path) -> None:
+    """Open a recording in a window of the viewer and wait until it is closed."""
+    with _viewer(["--bind", "127.0.0.1", str(recording)]) as viewer:
         if viewer.wait():
             raise MissingDependencyError(
                 f"the viewer ended with code {viewer.returncode}; try --web, or --screenshot FILE.png"
             )
+
+
+def serve(recording: Path) -> None:
+    """Show a recording to browsers on this machine only, at an address that is logged, until Ctrl-C."""
+    page, data = _free_port(9090), _free_port(9876)
+    options = [
+        "--bind",
+        "127.0.0.1",
+        "--port",
+        str(data),
+        "--serve-web",
+        "--web-viewer-port",
+        str(page),
+        str(recording),
+    ]
+    with _viewer(options) as viewer:
+        while not (_answers(page) and _answers(data)):
+            if viewer.poll() is not None:
+                raise MissingDependencyError(
+                    f"the viewer ended with code {viewer.returncode}; try --screenshot FILE.png"
+                )
+            time.sleep(0.1)
+        address = f"http://127.0.0.1:{page}/?url={quote(f'rerun+http://127.0.0.1:{data}/proxy', safe='')}"
+        log.info(f"{recording} is shown to browsers on this machine, until Ctrl-C, at\n    {address}")
+        if has_display():
+            webbrowser.open(address)
+        with suppress(KeyboardInterrupt):
+            viewer.wait()
+
+
+def has_display() -> bool:
+    """Whether there is a display for windows."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _free_port(wanted: int = 0) -> int:
+    """A port on this machine that nothing listens at: the wanted one, if that is free."""
+    with socket.socket() as free:
+        free.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            free.bind(("127.0.0.1", wanted))
+        except OSError:
+            free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def _answers(port: int) -> bool:
+    """Whether something listens at a port of this machine."""
+    with socket.socket() as client:
+        return client.connect_ex(("127.0.0.1", port)) == 0
 
 
 def viewer_program() -> str:
@@ -89,11 +141,9 @@ def viewer_program() -> str:
 @contextmanager
 def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
     """The viewer that came with rerun-sdk, running; ended with the block."""
-    program = viewer_program()
     quiet = subprocess.DEVNULL if "--headless" in options else None
-    with subprocess.Popen(
-        [program, *options], env=os.environ | {"RERUN_ANALYTICS": "false"}, stdout=quiet, stderr=quiet
-    ) as viewer:
+    environment = os.environ | {"RERUN_ANALYTICS": "false", "RUST_LOG": "error"}
+    with subprocess.Popen([viewer_program(), *options], env=environment, stdout=quiet, stderr=quiet) as viewer:
         try:
             yield viewer
         finally:
