@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: run test test-slow docs lint format bench bench-jobs numbers numbers-slow clean
+.PHONY: run test test-slow dist docs lint format bench bench-jobs numbers numbers-slow clean
 
 run: $(VENV)/installed  ## install, generate a world, learn a route, walk it, and print how to watch it
 	$(BIN)/tussock world --preset tussock-field --seed 7 --out world.glb --picture world.png
@@ -23,6 +23,9 @@ test: $(VENV)/developer  ## the quick tests, on all cores
 
 test-slow: $(VENV)/developer  ## the tests that take long: killed processes, full disks, whole studies, browsers
 	$(BIN)/pytest -n auto -m slow
+
+dist: $(VENV)/developer  ## a source archive and, made of it, a wheel, into dist/
+	$(BIN)/python -m build --no-isolation --outdir dist
 
 docs: $(VENV)/developer  ## the documentation site, into docs/_build; needs no network; a broken link or page fails
 	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -b html docs docs/_build
@@ -63,4 +66,4 @@ $(VENV)/developer: $(VENV)/installed
 	touch $@
 
 clean:
-	rm -rf $(VENV) run world.glb world.png docs/_build docs/recipes
+	rm -rf $(VENV) run world.glb world.png dist docs/_build docs/jupyter_execute docs/recipes

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tussock.navigation.models import MODELS
+from tussock.navigation.studies.protocols import PROTOCOLS
+
 DOCS = Path(__file__).parents[1] / "docs"
 
 
@@ -28,6 +31,17 @@ def test_a_recipe_is_short_and_says_what_it_shows(recipe):
     imports = sum(isinstance(each, ast.Import | ast.ImportFrom) for each in code)
     statements = [each for each in ast.walk(ast.Module(code, [])) if isinstance(each, ast.stmt)]
     assert len(statements) - imports <= 20
+
+
+def test_the_papers_of_all_models_and_protocols_are_listed():
+    rows = [line for line in (DOCS / "references.md").read_text().splitlines() if line.startswith("| ")]
+    papers = [getattr(MODELS.find(name), "paper", "") for name in MODELS.builtin]
+    papers += [PROTOCOLS.find(name).paper for name in PROTOCOLS.builtin]
+    for paper in "; ".join(papers).split("; "):
+        year = re.search(r"\b(19|20)\d\d\b", paper)
+        if year is not None and "thesis" not in paper:
+            first = paper.split()[0].rstrip(",")
+            assert any(first in row.partition("(")[0] and f"({year.group()})" in row for row in rows), paper
 
 
 def test_the_reference_has_every_flag_setting_and_parameter(tmp_path):

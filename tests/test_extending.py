@@ -7,12 +7,15 @@ import shlex
 import shutil
 import subprocess
 import sys
+import venv
 from pathlib import Path
 
 import pandas as pd
 import pytest
+import rerun_cli
 
-PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text()
+PAGE_PATH = Path(__file__).parents[1] / "docs" / "extending.md"
+PAGE = PAGE_PATH.read_text()
 TUSSOCK = str(Path(sys.executable).with_name("tussock"))
 SMALL = ["--world", "tiny", "--size", "60x12", "--route-length-m", "1", "--spacing-m", "0.1"]
 
@@ -108,6 +111,52 @@ def test_the_workers_of_a_sweep_take_classes_from_outside(name, workers, install
     assert name in command
     repeated = run_json([*shlex.split(command)[1:], "--out", "again"], installed, tmp_path)
     assert repeated["steps"] == table[table["model"] != "perfect-memory"].iloc[0]["steps"]
+
+
+@pytest.mark.slow
+def test_a_wheel_works_in_an_environment_of_its_own_and_takes_plug_ins(source, tmp_path):
+    """As `make dist` builds it, of the source archive; the libraries are those that are installed here."""
+    copy, plug_in, room = tmp_path / "copy", tmp_path / "antlab", tmp_path / "elsewhere"
+    ignored = shutil.ignore_patterns(".*", "build", "dist", "*.egg-info", "__pycache__")
+    shutil.copytree(PAGE_PATH.parents[1], copy, ignore=ignored)
+    shutil.copytree(source, plug_in)
+    room.mkdir()
+    for package in (copy, plug_in):
+        build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", package]
+        subprocess.run(build, check=True, capture_output=True)
+    wheels = list((tmp_path / "dist").glob("*.whl"))
+    assert {path.name.partition("-")[0] for path in wheels} == {"tussock", "antlab"}
+    assert len(list((tmp_path / "dist").glob("tussock-*.tar.gz"))) == 1
+    shutil.rmtree(copy)
+    venv.create(room / "venv", with_pip=True)
+    python = room / "venv" / "bin" / "python"
+    site = subprocess.run(
+        [python, "-c", "import site; print(site.getsitepackages()[0])"], capture_output=True, text=True
+    )
+    libraries = Path(rerun_cli.__file__).parents[
+        1
+    ]  # not in their own folder, so that the clone that is installed there is not found
+    Path(site.stdout.strip(), "libraries.pth").write_text(f"{libraries}\n")
+    pip = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed"]
+    subprocess.run([*pip, *wheels], check=True, capture_output=True)
+    for command in (["tussock"], ["python", "-m", "tussock"]):
+        words = [
+            room / "venv" / "bin" / command[0],
+            *command[1:],
+            "run",
+            *SMALL,
+            "--model",
+            "nearest",
+            "--overwrite",
+            "--json",
+        ]
+        done = subprocess.run(words, cwd=room, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout)["steps"] > 0
+    where = subprocess.run(
+        [python, "-c", "import tussock; print(tussock.__file__)"], cwd=room, capture_output=True, text=True
+    )
+    assert Path(where.stdout.strip()).is_relative_to(room)
 
 
 @pytest.mark.slow
