@@ -13,8 +13,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 import docstring_parser
 
 from tussock.navigation.cli.main import command_of
-from tussock.navigation.cli.overview import COMMANDS
 from tussock.navigation.cli.options import RunOptions
+from tussock.navigation.cli.overview import COMMANDS
 from tussock.navigation.settings_table import TYPES
 from tussock.world.params import PRESETS, WORLDS, WorldParams
 from tussock.world.settings import describe
@@ -127,7 +127,7 @@ def worlds() -> str:
         "# Parameters of worlds", "",
         "A preset's name, and after it any of these parameters, is a world: `--world 'meadow field_width=20 trees=0'`. A value outside its "
         "range is refused. In Python: `World.generate(WorldParams(field_width=20, trees=0), seed=7)`.", "",
-        "`tussock-field`, `meadow`, `scrub` and `tiny` have the same parameters, with other defaults:", "",
+        f"{', '.join(f'`{name}`' for name in PRESETS)} have the same parameters, with other defaults:", "",
         *table(("parameter", "meaning", "unit", "range", *PRESETS), rows), "",
         "## orchard", "", (inspect.getdoc(orchard) or "").split("\n\n")[0], "",
         *table(("parameter", "meaning", "default"), own),

@@ -17,6 +17,7 @@ TUSSOCK = str(Path(sys.executable).with_name("tussock"))
 _STUDY, _DATABASE = {"report", "results", "claims"}, {"database", "type", "images", "rendered", "seconds"}
 KEYS = {
     "world": {"world", "preset", "seed", "triangles"},
+    "world --list": {"worlds"},
     "view": {"view", "width", "height", "renderer"},
     "route": {"route", "length_m", "start", "goal"},
     "evaluate": {

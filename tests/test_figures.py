@@ -8,7 +8,17 @@ import pandas as pd
 import pytest
 from figure_laws import check_figure, drawn_texts
 
-from tussock.navigation.reports.drawing import STYLE, canvas, draw_lines, from_zero, legend_above
+from tussock.navigation import models
+from tussock.navigation.reports.drawing import (
+    MODEL_COLOURS,
+    STYLE,
+    canvas,
+    draw_lines,
+    from_zero,
+    legend_above,
+    model_colour,
+    model_markers,
+)
 from tussock.navigation.reports.layout import fit_texts
 from tussock.navigation.studies.protocols.figures import boxes_by_model, lines_by_model, means_by_model
 from tussock.navigation.studies.protocols.intervals import intervals
@@ -119,3 +129,23 @@ def test_a_figure_that_is_large_enough_keeps_its_size():
     axes[0, 0].set_title("short")
     fit_texts(figure)
     assert figure.get_size_inches().tolist() == [6, 3]
+
+
+def test_a_model_has_one_colour_whatever_stands_beside_it():
+    colours = {name: model_colour(name) for name in models.MODELS.builtin}
+    assert len(set(colours.values())) == len(colours)
+    assert model_colour("infomax units=20") == colours["infomax"]
+    assert model_colour("my.package:Model") == model_colour("my.package:Model power=2") in MODEL_COLOURS
+    assert model_markers(["chain", "infomax", "chain every=2", "infomax units=3"]) == ["o", "o", "s", "s"]
+
+
+def test_a_point_on_an_axis_of_numbers_is_at_its_number():
+    runs = [
+        {"model": model, "offset_m": offset, "world": "tiny", "seed": seed, "world_seed": seed, "route": None, "route_seed": None,
+         "arrived": True, "error": None}
+        for model in ("chain", "infomax") for offset in (0.0, 0.1) for seed in range(3)
+    ]  # fmt: skip
+    figure = along_axis(pd.DataFrame(runs), ["offset_m"], ["arrived"], ["model"])
+    drawn = [np.array(line.get_xdata()) for line in figure.axes[0].lines]
+    assert len(drawn) >= 2
+    assert all(np.isin(places, [0.0, 0.1]).all() for places in drawn)

@@ -37,6 +37,7 @@ from tussock.navigation.models import PerfectMemory
 from tussock.navigation.models import files as model_files
 from tussock.navigation.models.files import TrainedModel, save_model
 from tussock.navigation.reports.report import Drawing
+from tussock.navigation.sweeps.recordings import record_again
 from tussock.navigation.sweeps.report import arrivals, write_sweep_report
 from tussock.navigation.sweeps.spec import Sweep
 from tussock.navigation.sweeps.store import TIMES, Finished, Store, read_steps, table_of
@@ -44,7 +45,6 @@ from tussock.navigation.sweeps.sweep import (
     MAX_SMALL_TOGETHER,
     MAX_TOGETHER,
     finished_run,
-    record_again,
     run_sweep,
     side_by_side,
 )
@@ -119,6 +119,10 @@ def test_the_worst_runs_are_recorded(swept):
     assert (swept / recorded["recording"]).is_file()
     worst = rows.sort_values(["arrived", "mean_deviation_m"], ascending=[True, False]).iloc[0]
     assert recorded["key"] == worst["key"]
+    assert (
+        recorded["recording"]
+        == f"worst/{worst['model'].replace(' ', '-').replace('=', '-')}-{worst['key']}/recording.rrd"
+    )
 
 
 def test_a_second_time_nothing_is_done_and_new_choices_of_an_axis_are_added(capfd, swept, cluster, tmp_path):

@@ -85,8 +85,8 @@ def rounded(*arrays) -> str:
         ("meadow", 5, "c1512b59599e", 1, 8.0, None, "871cdc715564"),
         ("scrub", 5, "700445762445", 1, 8.0, None, "1edbab5cb472"),
         ("tiny", 5, "76b543786054", 1, 8.0, None, "acd623f325ac"),
-        ("hay-meadow", 5, "?", 1, 8.0, None, "?"),
-        ("woodland", 5, "?", 1, 8.0, None, "?"),
+        ("hay-meadow", 5, "bc4ffce89c18", 1, 8.0, None, "4eff9ad08bed"),
+        ("woodland", 5, "cd1ad26ca428", 1, 8.0, None, "04281bba0a6a"),
         ("meadow flower_share=1 grass_height=0.14 field_depth=4", 2, "f93518b80c0f", 3, 4.0, None, "26d410f2c95c"),
         ("tussock-field field_width=18 field_depth=14", 1, "dc47bb3c69c3", 2, 12.0, None, "b05323666b9d"),
         ("scrub", 6, "38a27787c532", 1, 3.0, (3.25, 4.25), "94d931989501"),
@@ -356,7 +356,15 @@ def test_a_registered_preset_is_generated_by_name(monkeypatch):
 
 def test_the_public_names_are_listed_and_each_loads():
     names = {"World", "Pose", "Route", "Bounds", "Ground", "WorldParams", "open_world", "read_world", "write_world"}
-    names |= {"read_route", "write_route", "generate_route", "MeshReading", "column_azimuths", "turn_of_columns"}
+    names |= {
+        "read_route",
+        "write_route",
+        "generate_route",
+        "MeshReading",
+        "column_azimuths",
+        "turn_of_columns",
+        "no_progress",
+    }
     names |= {"InputError", "SettingError", "FileError", "DiskFullError", "MissingDependencyError"}
     assert set(dir(world_package)) == set(world_package.__all__) == names
     for name in names:

@@ -128,6 +128,11 @@ def test_what_is_added_leaves_all_else_as_it_is():
     assert len(more.triangles) > n + 1000
 
 
+def test_the_cover_of_the_ground_leaves_routes_as_they_are():
+    plain, covered = (generate_route(generated(text), 1) for text in ("tiny", f"tiny {COVER} hedge_height=1.5"))
+    np.testing.assert_array_equal(plain.poses, covered.poses)
+
+
 def test_trees_grow_in_a_wood():
     params = WORLDS.find("woodland")()
     layout = plant_layout(params, 3)[0]

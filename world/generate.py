@@ -1,29 +1,35 @@
 """What grows where in a generated world, from its parameters and a seed.
 
 Plants follow a Neyman-Scott process: parents are placed where a smooth random field is high, and plants are scattered around
-them. Clearings and winding corridors stay open. A skyline of trees and tall shrubs surrounds the field.
+them. Clearings and winding corridors stay open. A skyline of trees and tall shrubs surrounds the field. Speckles and litter may
+cover the ground, and a hedge hide its end.
 """
-
-from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
 
 from .errors import SettingError
 from .geometry import Bounds
+from .ground_cover import litter, speckles
+from .hedge import hedge
+from .herbs import culms, herb
 from .params import WorldParams
-from .plant_parts import Plant
+from .plant_parts import Plant, joined
 from .plants import bush, grass, leaf, stone, tree, tussock
+from .random_fields import PlaneFunction, random_field, random_ring
+from .trees import branching_tree
 
 GENERATOR = 1  # version: raise it whenever the same seed gives another world
-MAX_HAZE = 0.6  # share of the sky's colour in the farthest tree
 
-PlaneFunction = Callable[[Float[np.ndarray, "n 2"]], Float[np.ndarray, " n"]]  # a value at each position (m)
 Layout = dict[str, Float[np.ndarray, "n 4"]]  # of each kind: x, y, size (m), and tone (0 to 1), which colours follow
 Streams = dict[str, np.random.Generator]
 
-STREAMS = ("land", "bush", "stone", "tussock", "grass", "leaf", "tree")  # append new ones: old seeds stay as they are
-SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "leaf": leaf}
+STREAMS = (  # append new ones: old seeds stay as they are
+    "land", "bush", "stone", "tussock", "grass", "leaf", "tree",
+    "herb", "culm", "litter", "inner_tree", "speckles", "hedge",
+)  # fmt: skip
+SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "leaf": leaf, "herb": herb}
+AT_ONCE = {"grass": grass, "culm": culms, "litter": litter}  # kinds with so many plants that they are shaped together
 
 
 def generate_plants(params: WorldParams, seed: int) -> Plant:
@@ -32,23 +38,26 @@ def generate_plants(params: WorldParams, seed: int) -> Plant:
     Raises SettingError for a seed that is not a whole number from 0.
     """
     layout, streams = plant_layout(params, seed)
-    field = params.field
-    triangles, rgb = [np.zeros((0, 3, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
+    pieces = [(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8))]
     for kind, rows in layout.items():
-        if kind == "grass":
-            corners, colours = grass(params, rows, streams[kind])
-            triangles.append(corners)
-            rgb.append(colours)
+        if kind in AT_ONCE:
+            pieces.append(AT_ONCE[kind](params, rows, streams[kind]))
             continue
         for x, y, size, tone in rows.tolist():
-            if kind == "tree":
-                distance = max(field.x_min - x, x - field.x_max, field.y_min - y, y - field.y_max, 0.0)
-                corners, colours = tree(params, size, tone, streams[kind], min(params.haze * distance, MAX_HAZE))
+            if kind in ("tree", "inner_tree"):
+                corners, colours = _tree(params, x, y, size, tone, streams[kind])
             else:
                 corners, colours = SHAPES[kind](params, size, tone, streams[kind])
-            triangles.append(corners + np.array([x, y, 0], np.float32))
-            rgb.append(colours)
-    return np.concatenate(triangles), np.concatenate(rgb)
+            pieces.append((corners + np.array([x, y, 0], np.float32), colours))
+    pieces += [speckles(params, streams["speckles"]), hedge(params, streams["hedge"])]
+    return joined(pieces)
+
+
+def _tree(p: WorldParams, x: float, y: float, size: float, tone: float, rng: np.random.Generator) -> Plant:
+    """A tree of some height (m) that stands at a position (m), whose distance from the field decides its haze."""
+    field = p.field
+    haze = p.haze_at(max(field.x_min - x, x - field.x_max, field.y_min - y, y - field.y_max, 0.0))
+    return (branching_tree if p.tree_forks else tree)(p, size, tone, rng, haze)
 
 
 def seeded(seed: int) -> np.random.Generator:
@@ -62,7 +71,7 @@ def plant_layout(params: WorldParams, seed: int) -> tuple[Layout, Streams]:
     """Where every plant, stone and tree of a world is, by kind, and the generator for the shapes of each kind."""
     streams: Streams = dict(zip(STREAMS, seeded(seed).spawn(len(STREAMS)), strict=True))
     p, land = params, streams["land"]
-    fertility, tone = _random_field(p.patch_size, land), _random_field(2 * p.patch_size, land)
+    fertility, tone = random_field(p.patch_size, land), random_field(2 * p.patch_size, land)
     open_ground = _open_ground(p, land)
     area = p.field.widened(p.border)
 
@@ -80,6 +89,10 @@ def plant_layout(params: WorldParams, seed: int) -> tuple[Layout, Streams]:
         "grass": rows_of("grass", p.grass_density, p.grass_height, p.size_spread),
         "leaf": rows_of("leaf", p.leaf_density, p.leaf_length, 0.25, clustered=False),
         "tree": _skyline(p, streams["tree"]),
+        "herb": rows_of("herb", p.herb_density, p.herb_height, p.size_spread),
+        "culm": rows_of("culm", p.culm_density, p.culm_height, 0.5 * p.size_spread),
+        "litter": _litter(p, area, streams["litter"]),
+        "inner_tree": rows_of("inner_tree", p.tree_density, p.tree_height, 0.5 * p.size_spread, 0.25 * p.tree_height),
     }
     _move_to_tussocks(layout["grass"], layout["tussock"], p.grass_near_tussocks, streams["grass"])
     return layout, streams
@@ -137,6 +150,14 @@ def _thinned(xy, count: int, apart: float) -> Float[np.ndarray, "n 2"]:
     return xy[kept]
 
 
+def _litter(p: WorldParams, area: Bounds, rng: np.random.Generator) -> Float[np.ndarray, "n 4"]:
+    """Rows of the litter: anywhere, on open ground as well."""
+    count = round(p.litter_density * area.size[0] * area.size[1])
+    xy = np.array(area[:2]) + area.size * rng.random((count, 2))
+    sizes = p.litter_length * np.clip(rng.lognormal(0, 0.4, count), 0.4, 2.1)
+    return np.column_stack([xy, sizes, rng.random(count)])
+
+
 def _move_to_tussocks(grass, tussocks, share: float, rng: np.random.Generator) -> None:
     """Move a share of the grass (rows of a layout, changed in place) to the feet of tussocks, more to the taller ones."""
     moved = np.flatnonzero(rng.random(len(grass)) < share)
@@ -152,7 +173,7 @@ def _move_to_tussocks(grass, tussocks, share: float, rng: np.random.Generator) -
 def _skyline(p: WorldParams, rng: np.random.Generator) -> Float[np.ndarray, "n 4"]:
     """Rows of the trees: an irregular ring with gaps, whose heights and kinds vary with the direction."""
     angles = np.linspace(-np.pi, np.pi, 720, endpoint=False)
-    density, tallness, kind = (_random_ring(angles, rng) for _ in range(3))
+    density, tallness, kind = (random_ring(angles, rng) for _ in range(3))
     weight = np.clip(density - np.quantile(density, p.tree_gaps), 0, None) ** 0.6 + 1e-9
     order = (np.arange(p.trees) + rng.random(p.trees)) / max(p.trees, 1)
     angle = np.interp(order, np.cumsum(weight) / weight.sum(), angles)
@@ -168,20 +189,6 @@ def _skyline(p: WorldParams, rng: np.random.Generator) -> Float[np.ndarray, "n 4
     return np.column_stack([xy, height, tone])
 
 
-def _random_field(scale: float, rng: np.random.Generator) -> PlaneFunction:
-    """A smooth random function of position, with mean 0 and standard deviation 1; its hills are about `scale` metres apart."""
-    waves, phase = rng.normal(0, 1.6 / scale, (2, 48)), rng.uniform(0, 2 * np.pi, 48)
-    return lambda xy: np.cos(xy @ waves + phase).sum(axis=1) / np.sqrt(24)
-
-
-def _random_ring(angles, rng: np.random.Generator) -> Float[np.ndarray, " n"]:
-    """A smooth random function of direction, with mean 0 and standard deviation 1."""
-    k = np.arange(1, 9)
-    size, phase = rng.normal(0, 1, 8) * k**-0.35, rng.uniform(0, 2 * np.pi, 8)
-    values = np.cos(angles[:, None] * k + phase) @ size
-    return (values - values.mean()) / values.std()
-
-
 def _open_ground(p: WorldParams, rng: np.random.Generator) -> PlaneFunction:
     """Where nothing grows: 1 in clearings and corridors, 0 outside, smooth at their edges.
 
@@ -190,7 +197,7 @@ def _open_ground(p: WorldParams, rng: np.random.Generator) -> PlaneFunction:
     centres = rng.random((p.clearings, 2)) * [p.field_width, p.field_depth]
     radius = p.clearing_radius * rng.lognormal(0, 0.3, p.clearings)
     scale = 0.3 * min(p.field_width, p.field_depth)
-    waves, phase, ragged = rng.normal(0, 1 / scale, (2, 12)), rng.uniform(0, 2 * np.pi, 12), _random_field(0.4, rng)
+    waves, phase, ragged = rng.normal(0, 1 / scale, (2, 12)), rng.uniform(0, 2 * np.pi, 12), random_field(0.4, rng)
 
     def share(xy):
         angle = xy @ waves + phase

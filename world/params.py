@@ -11,6 +11,8 @@ from .registry import LOCATION, Registry
 from .settings import RGB, colour, number, settings, whole
 from .specs import Spec
 
+MAX_HAZE = 0.6  # share of the sky's colour in the farthest tree
+
 
 @settings
 class WorldParams:
@@ -67,6 +69,24 @@ class WorldParams:
         tree_rgb: Colour of crowns in some directions.
         tree_other_rgb: Colour of crowns in the other directions.
         haze: Share of the sky's colour in a tree's, per metre of distance from the field.
+        tree_density: Density of trees in the field itself.
+        tree_forks: How often the trunks of trees fork into thinner branches, with the leaves at the last ones; 0 for crowns of
+            lumps.
+        herb_density: Density of herbs.
+        herb_height: Height of a herb.
+        herb_rgb: Colour of the leaves of herbs.
+        herb_flower_rgb: Colour of the flowers of herbs.
+        culm_density: Density of thin stems of grass with a seed head.
+        culm_height: Height of such a stem.
+        litter_density: Density of litter: leaves and dead stems that lie on the ground, so low that an insect walks over them.
+        litter_length: Length of a leaf in the litter; stems are twice as long.
+        litter_stems: Share of stems in the litter.
+        litter_green: Share of the leaves in the litter that are alive, such as those of clover; they have the colour of herbs.
+        speckle: Standard deviation of the log brightness of speckles of the ground; 0 for a ground of one colour.
+        speckle_size: Width of a speckle.
+        moss_share: Share of the ground that is covered with moss.
+        moss_rgb: Colour of moss.
+        hedge_height: Median height of a hedge where the ground ends, which hides the end from eyes lower than a third of it; 0 for none.
     """
 
     name: ClassVar[str] = "world"  # in errors
@@ -125,11 +145,36 @@ class WorldParams:
     tree_rgb: RGB = colour((72, 98, 56))
     tree_other_rgb: RGB = colour((122, 112, 48))
     haze: float = number(0.035, low=0, high=1, unit="share of sky per metre")
+    tree_density: float = number(0.0, low=0, high=1, unit="1/m2")
+    tree_forks: int = whole(0, low=0, high=4, unit="forks")
+
+    herb_density: float = number(0.0, low=0, high=100, unit="1/m2")
+    herb_height: float = number(0.15, low=0.02, high=1, unit="m")
+    herb_rgb: RGB = colour((92, 132, 56))
+    herb_flower_rgb: RGB = colour((232, 226, 214))
+
+    culm_density: float = number(0.0, low=0, high=200, unit="1/m2")
+    culm_height: float = number(0.35, low=0.05, high=2, unit="m")
+
+    litter_density: float = number(0.0, low=0, high=500, unit="1/m2")
+    litter_length: float = number(0.03, low=0.005, high=0.2, unit="m")
+    litter_stems: float = number(0.5, low=0, high=1, unit="share of litter")
+    litter_green: float = number(0.0, low=0, high=1, unit="share of leaves in litter")
+
+    speckle: float = number(0.0, low=0, high=1, unit="log brightness")
+    speckle_size: float = number(0.07, low=0.02, high=1, unit="m")
+    moss_share: float = number(0.0, low=0, high=1, unit="share of the ground")
+    moss_rgb: RGB = colour((94, 112, 52))
+    hedge_height: float = number(0.0, low=0, high=20, unit="m")
 
     @property
     def field(self) -> Bounds:
         """The field (m)."""
         return Bounds(0.0, 0.0, self.field_width, self.field_depth)
+
+    def haze_at(self, distance: float) -> float:
+        """Share of the sky's colour in what stands at a distance from the field (m)."""
+        return min(self.haze * distance, MAX_HAZE)
 
     def to_dict(self) -> dict[str, Any]:
         """The parameters as plain JSON types, as in `World.origin["params"]`; `WorldParams(**values)` is the inverse."""
@@ -156,14 +201,51 @@ TINY = partial(  # fewer than 200 triangles for any seed
     grass_density=1.78, grass_blades=2, grass_height=0.04, flower_share=0.0, bush_density=0.0, leaf_density=0.0,
     stone_density=0.0, trees=7, tree_height=1.3, tree_distance=0.9, tree_leaves=8,
 )  # fmt: skip
+HAY_MEADOW = partial(
+    WorldParams, border=0.5, ground_margin=30.0, ground_rgb=(112, 92, 64), sky_rgb=(176, 208, 238), patchiness=0.5,
+    cluster_plants=25.0, cluster_radius=0.08, size_spread=0.45, clearings=1, clearing_radius=0.5, corridor_width=0.4,
+    tussock_density=0.6, tussock_height=0.3, tussock_rgb=(104, 146, 60), dry_rgb=(172, 152, 104), dry_share=0.15,
+    grass_density=85.0, grass_height=0.17, grass_near_tussocks=0.05, grass_rgb=(112, 154, 58), flower_share=0.08,
+    flower_rgb=(232, 196, 48), bush_density=0.0, leaf_density=0.0, stone_density=0.03,
+    trees=36, tree_height=3.0, tree_gaps=0.25, tree_leaves=150, tree_rgb=(64, 112, 58), tree_other_rgb=(96, 132, 60), tree_forks=2,
+    herb_density=6.0, herb_flower_rgb=(176, 112, 190), culm_density=18.0, culm_height=0.38,
+    litter_density=300.0, litter_length=0.022, litter_stems=0.35, litter_green=0.6, leaf_rgb=(132, 102, 60),
+    speckle=0.2, moss_share=0.55, hedge_height=3.0,
+)  # fmt: skip
+WOODLAND = partial(
+    WorldParams, border=0.5, ground_margin=30.0, ground_rgb=(100, 78, 54), sky_rgb=(196, 214, 226), corridor_width=0.5,
+    tussock_density=0.3, tussock_height=0.22, tussock_rgb=(96, 132, 56), dry_rgb=(158, 130, 88),
+    grass_density=12.0, grass_height=0.1, grass_rgb=(104, 140, 58), flower_share=0.0,
+    bush_density=0.3, bush_height=0.5, bush_leaves=100, leaf_density=0.0, stone_density=0.08,
+    trees=60, tree_height=5.0, tree_gaps=0.05, tree_leaves=400, tree_density=0.12, tree_forks=3,
+    herb_density=7.0, herb_flower_rgb=(236, 234, 224),
+    litter_density=300.0, litter_length=0.032, litter_stems=0.15, litter_green=0.1, leaf_rgb=(146, 92, 50),
+    speckle=0.2, moss_share=0.25, moss_rgb=(80, 102, 44), hedge_height=6.0,
+)  # fmt: skip
 
 # A preset returns WorldParams, as these do, or takes a seed and returns a World.
-PRESETS = {"tussock-field": "WorldParams", "meadow": "MEADOW", "scrub": "SCRUB", "tiny": "TINY"}
+PRESETS = {
+    "tussock-field": "WorldParams",
+    "meadow": "MEADOW",
+    "scrub": "SCRUB",
+    "tiny": "TINY",
+    "hay-meadow": "HAY_MEADOW",
+    "woodland": "WOODLAND",
+}
 WORLDS = Registry(
     "worlds",
     "world",
     {name: f"{__name__}:{where}" for name, where in PRESETS.items()} | {"orchard": "tussock.world.orchard:orchard"},
 )
+SENTENCES = {  # what the worlds of tussock are
+    "tussock-field": "Tussocks and short grass, bushes and trees about it; most results are of it",
+    "meadow": "Thin grass on bare ground, few tussocks",
+    "scrub": "Dry scrub on red ground: bushes, tussocks, stones",
+    "tiny": "Fewer than 200 triangles, for tests and first tries",
+    "hay-meadow": "Dense grasses, seed heads, herbs and flowers on a speckled ground with litter",
+    "woodland": "Trees with branches, twigs and leaves over a ground of dead leaves, moss and herbs",
+    "orchard": "Single trees on open ground, as in the forests of Bee-Nav (2026)",
+}
 
 
 def is_generated(text: str) -> bool:

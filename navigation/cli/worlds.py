@@ -16,12 +16,14 @@ from .terminal import message
 
 @dataclass
 class WorldCommand(Command):
-    """Generate a world and save it."""
+    """Generate a world and save it, or list those that there are."""
 
-    out: Path
-    """File to write: .glb or .ply."""
+    list: bool = False
+    """List the presets instead."""
+    out: Path | None = None
+    """File to write: .glb or .ply. Needed, but for a list."""
     preset: str = "tussock-field"
-    """tussock-field, meadow, scrub, tiny or orchard."""
+    """Name of a preset, after which parameters may follow, as in 'meadow field_width=20'; --list lists the names."""
     seed: int = 0
     """The same seed gives the same file."""
     picture: Path | None = None
@@ -30,8 +32,13 @@ class WorldCommand(Command):
     def run(self) -> dict[str, Any]:
         from tussock.world.atomic import check_writable
         from tussock.world.files import write_world
+        from tussock.world.params import SENTENCES, WORLDS
         from tussock.world.scene import World
 
+        if self.list:
+            return {"worlds": {name: {"what": SENTENCES.get(name, "")} for name in WORLDS.names}}
+        if self.out is None:
+            raise SettingError("--out is missing: give the file to write, such as --out world.glb, or --list")
         check_writable(self.out)
         check_picture(self.picture)
         world = World.generate(self.preset, self.seed)

@@ -55,7 +55,7 @@ def write_overview(
         if walk is not None and len(walk):
             axes.plot(*walk.T, color=PATH_COLOUR, lw=1.4, label="path")
             axes.plot(*walk[0], "o", color=PATH_COLOUR, ms=7, mec="white", label="start")
-            axes.plot(*walk[-1], "X", color=PATH_COLOUR, ms=9, mec="white", label="end")
+            axes.plot(*walk[-1], "s", color=PATH_COLOUR, ms=8, mec="white", label="end")
         if route is not None or walk is not None:
             axes.legend(loc="upper left", framealpha=0.9)
         axes.set_title(title)

@@ -20,6 +20,8 @@ from ..reports.drawing import (
     draw_panorama,
     from_zero,
     legend_above,
+    model_colour,
+    model_markers,
 )
 from ..reports.maps import draw_map, draw_route, map_axes
 from .statistics import MEASURES, SHARES, axis_label, by_axis, choice_label
@@ -53,17 +55,19 @@ def along_axis(table: pd.DataFrame, axis: list[str], measures: list[str], by: li
     labels = list(by_axis(table, axis, []))
     numeric = len(axis) == 1 and pd.api.types.is_numeric_dtype(table[axis[0]]) and not bool(table[axis[0]].isna().any())
     positions = np.sort(table[axis[0]].unique().astype(float)) if numeric else np.arange(len(labels), dtype=float)
-    room = np.diff(positions).min() if len(positions) > 1 else 1.0
-    style = "o-" if numeric and not axis[0].endswith("seed") else "o"
+    line = "-" if numeric and not axis[0].endswith("seed") else ""
+    of_models = by == ["model"]
+    markers = model_markers(label for label, _ in lines) if of_models else ["o"] * len(lines)
     for number, (label, part) in enumerate(lines):
-        # Lines are shifted, so that their intervals do not cover each other.
-        shift = (0.3 if numeric else 0.6) * room * ((number + 0.5) / len(lines) - 0.5)
+        # Among choices, lines are shifted, so that their intervals do not cover each other; numbers are where they are.
+        shift = 0.0 if numeric else 0.6 * ((number + 0.5) / len(lines) - 0.5)
         intervals = {choice: each.intervals for choice, each in by_axis(part, axis, measures).items()}
         known = [k for k, choice in enumerate(labels) if choice in intervals]
         for measure, panel in panels.items():
             values = [intervals[labels[k]][measure] for k in known]
-            colour = COLOURS[number % len(COLOURS)]
-            _draw_intervals(panel, positions[known] + shift, values, fmt=style, color=colour, label=label)
+            colour = model_colour(label) if of_models else COLOURS[number % len(COLOURS)]
+            fmt = markers[number] + line
+            _draw_intervals(panel, positions[known] + shift, values, fmt=fmt, color=colour, label=label)
     for measure, panel in panels.items():
         panel.set_ylabel(MEASURES[measure])
         panel.grid(axis="y", color="#00000018")

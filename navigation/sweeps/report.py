@@ -14,6 +14,7 @@ from ..reports.report import REPORT, Block, Command, Drawing, Report, Section, T
 from ..reports.report import RESULTS as REPLICATION_RESULTS
 from ..reports.results import plain_json
 from .figures import along_axis
+from .recordings import worst_of
 from .statistics import (
     IN_TABLES,
     MAX_CHOICES,
@@ -29,7 +30,6 @@ from .statistics import (
     worlds_of,
 )
 from .store import TABLE, Store, read_steps, read_title
-from .sweep import worst_of
 from .tables import INTERVALS, PAIRS, pair_table, pairing_numbers, summary_numbers, summary_table
 from .worst import walk_section
 

@@ -1,9 +1,7 @@
 """Running a sweep: on the cores of this machine or on any Dask cluster, and going on where an earlier one stopped."""
 
-import json
 import logging
 import math
-import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -20,14 +18,14 @@ from distributed.comm.core import CommClosedError
 
 from tussock.render.cores import core_count
 from tussock.render.eye import Eye
-from tussock.world.errors import FileError, InputError, MissingDependencyError, first_line
-from tussock.world.progress import Progress, no_progress, printed
+from tussock.world.errors import InputError, MissingDependencyError, first_line
+from tussock.world.progress import Progress, printed
 
 from ..experiment import Experiment
 from ..experiment_keys import Keys
 from ..experiment_settings import TYPES, run_command, settings_of
-from ..recording.run_folder import record_run
 from . import work
+from .recordings import record_again, recording_folder, recordings_in, worst_of
 from .spec import Sweep
 from .store import TABLE, Finished, Store, write_table, write_title
 from .work import Walked, draw, learn, walk
@@ -42,7 +40,6 @@ MAX_SMALL_TOGETHER, SMALL = (
 )  # .. but for views of few rays, where what a look costs beside drawing is worth sharing
 PARTS = 3  # groups of runs for each worker, where there are few runs
 QUEUED = 4  # groups that each worker has before it; more would only fill the scheduler's memory
-WORST = "worst"  # folder of the recordings
 SECONDS = 10.0  # to wait for a scheduler
 LOCAL: dict[str, Any] = {  # options of the workers on this machine, which nobody else can reach
     "threads_per_worker": 1,
@@ -107,12 +104,13 @@ def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
     with Store(out) as store:
         table = store.table()
         worst = worst_of(table[table["key"].isin(runs)], count)
+        folders = {key: out / recording_folder(key, store.row(key)["model"]) for key in worst}
         try:
-            for key in worst:
-                record_again(runs[key], store.row(key), out / WORST / key)
+            for key, folder in folders.items():
+                record_again(runs[key], store.row(key), folder)
         finally:
             _write_table(store, out)
-    return [out / WORST / key for key in worst]
+    return list(folders.values())
 
 
 def _by_key(sweep: Sweep) -> dict[str, Experiment]:
@@ -264,37 +262,10 @@ def finished_run(experiment: Experiment, key: str, result: Walked | InputError) 
     return Finished(key=key, settings=settings, row=row, steps=result.steps)
 
 
-def worst_of(table: pd.DataFrame, count: int) -> list[str]:
-    """Keys of the worst runs: those that did not arrive, then those put back most often, then those with the greatest deviation."""
-    walked = table[table["error"].isna()]
-    if walked.empty:
-        return []
-    badness = ["arrived", "resets", "mean_deviation_m"]
-    return walked.sort_values(badness, ascending=[True, False, False], kind="stable")["key"].head(count).tolist()
-
-
-def record_again(experiment: Experiment, row: dict[str, Any], out: Path) -> None:
-    """Repeat a finished run with a recording, unless there is one. Raises InputError where its result differs."""
-    names, summary = ("arrived", "steps", "mean_deviation_m", "resets"), out / "summary.json"
-    recorded = json.loads(summary.read_text(encoding="utf-8")) if summary.exists() else {}
-    if all(recorded.get(name) == row[name] for name in names):
-        return
-    recorded = record_run(experiment, out, overwrite=True, learning=no_progress, walking=no_progress)
-    different = [name for name in names if recorded[name] != row[name]]
-    if different:
-        shutil.rmtree(out)
-        raise FileError(
-            f"{out}: repeated on this machine, the run had another result ({', '.join(different)}); its worker computes differently"
-        )
-
-
 def _write_table(store: Store, out: Path) -> pd.DataFrame:
     """Write the table of all finished runs. A column gives the path of the recording, if there is one."""
     table = store.table()
-    recorded = {
-        path.parent.name: f"{WORST}/{path.parent.name}/recording.rrd" for path in out.glob(f"{WORST}/*/summary.json")
-    }
     if len(table):
-        table["recording"] = table["key"].map(recorded).astype("string")
+        table["recording"] = table["key"].map(recordings_in(out)).astype("string")
     write_table(table, out)
     return table

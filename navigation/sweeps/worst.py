@@ -20,7 +20,7 @@ from ..failures import Cause, Diagnosis
 from ..reports.report import Command, Drawing, Section
 from ..training import training_source, training_views
 from .figures import view_and_match, walk_map
-from .sweep import WORST
+from .recordings import recording_folder
 
 
 def walk_section(number: int, key: str, row: dict[str, Any], steps: pd.DataFrame, folder: Path) -> Section:
@@ -39,15 +39,16 @@ def walk_section(number: int, key: str, row: dict[str, Any], steps: pd.DataFrame
     shown = step_to_show(row, steps)
     evidence = describe_evidence(steps.iloc[shown])
     caption = f"Step {shown}" + (f": {evidence}." if evidence else ".")
-    if (folder / WORST / key / "summary.json").exists():
-        caption += f" Its recording is {WORST}/{key}/recording.rrd."
+    recorded = recording_folder(key, row["model"])
+    if (folder / recorded / "summary.json").exists():
+        caption += f" Its recording is {recorded}/recording.rrd."
     drawing = Drawing(
         names=(f"walk-{key}", f"view-{key}"),
         draw=lambda: _draw(row, steps, shown),
         alt=f"The walk from above, and its view at step {shown}",
         caption=caption,
     )
-    title = f"{number}. {_describe(row)}" + (f": {row['cause']}" if row["cause"] else "")
+    title = f"{number}. {row['model']}: {_describe(row)}" + (f": {row['cause']}" if row["cause"] else "")
     return Section(title=title, anchor=f"walk-{key}", blocks=[drawing, Command(row["command"])])
 
 

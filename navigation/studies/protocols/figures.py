@@ -1,7 +1,5 @@
 """Figures of tables of walks, one line or box per model."""
 
-from itertools import cycle
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -17,13 +15,14 @@ from ...reports.drawing import (
     empty_figure,
     from_zero,
     legend_above,
+    model_colour,
+    model_markers,
 )
 from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
 MAX_TICKS = 8  # at the values themselves
 MAX_COLUMNS = 3  # of heat maps
-MARKERS = "osD^vPX"  # seven, so that 35 models look different in five colours
 
 
 def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str, *, diagonal: bool = False) -> Figure:
@@ -42,11 +41,12 @@ def lines_by_model(walks: pd.DataFrame, x: str, y: str, xlabel: str, ylabel: str
     """
     figure, axes = canvas((7.2, 3.4))
     axis = axes[0, 0]
-    for model, colour, marker in zip(models_in(walks), cycle(COLOURS), cycle(MARKERS), strict=False):
+    models = models_in(walks)
+    for model, marker in zip(models, model_markers(models), strict=True):
         grouped = walks[(walks["model"] == model) & walks[y].notna()].groupby(x)
         found = {at: positive_interval(each[y].to_numpy(float), pd.factorize(each["place"])[0]) for at, each in grouped}
         mean, low, high = np.array([(each.value, each.low, each.high) for each in found.values()]).reshape(-1, 3).T
-        style = {"fmt": f"-{marker}", "color": colour, "label": model}
+        style = {"fmt": f"-{marker}", "color": model_colour(model), "label": model}
         axis.errorbar(list(found), mean, yerr=[mean - low, high - mean], ms=5, lw=1.6, capsize=2, **style)
     if diagonal:
         ends = np.array([0.0, walks[x].max()])
@@ -73,8 +73,8 @@ def boxes_by_model(walks: pd.DataFrame, y: str, ylabel: str) -> Figure:
         tick_labels=models,
         medianprops={"lw": 1.8},
     )
-    for k, (box, middle) in enumerate(zip(drawn["boxes"], drawn["medians"], strict=True)):
-        colour = COLOURS[k % len(COLOURS)]
+    for model, box, middle in zip(models, drawn["boxes"], drawn["medians"], strict=True):
+        colour = model_colour(model)
         box.set(facecolor=colour + "33", edgecolor=colour)
         middle.set_color(colour)
     axis.set_ylabel(ylabel)

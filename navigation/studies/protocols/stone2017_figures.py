@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from ...reports.drawing import CURVE_COLOUR, PATH_COLOUR, SOFT_COLOUR, canvas, from_zero, legend_above
-from .figures import COLOURS, MARKERS
+from ...reports.drawing import CURVE_COLOUR, MARKERS, PATH_COLOUR, SOFT_COLOUR, canvas, from_zero, legend_above
+from .figures import COLOURS
 
 CIRCLE = 20.0  # units about the nest
 VIEWED = 80.0  # units from the nest, in the figure of the search
