@@ -10,14 +10,11 @@ from figure_laws import check_figure, drawn_texts
 
 from tussock.navigation import models
 from tussock.navigation.reports.drawing import (
-    MODEL_COLOURS,
     STYLE,
     canvas,
     draw_lines,
     from_zero,
     legend_above,
-    model_colour,
-    model_markers,
 )
 from tussock.navigation.reports.layout import fit_texts
 from tussock.navigation.studies.protocols.figures import boxes_by_model, lines_by_model, means_by_model
@@ -25,6 +22,7 @@ from tussock.navigation.studies.protocols.intervals import intervals
 from tussock.navigation.studies.thesis.heading_maps import heading_maps
 from tussock.navigation.studies.thesis.study_data import StudyData
 from tussock.navigation.sweeps.figures import along_axis
+from tussock.navigation.sweeps.model_colours import MODEL_COLOURS, model_colour, model_markers
 from tussock.navigation.sweeps.store import table_of
 from tussock.world.geometry import Route
 

@@ -19,6 +19,11 @@ PAGES = [
     "reference/commands",
     "reference/python",
     "recipes/index",
+    "references",
+    "notebooks/index",
+    "notebooks/practical",
+    "notebooks/own_data",
+    "notebooks/own_model_and_navigator",
 ]
 
 pytestmark = pytest.mark.slow

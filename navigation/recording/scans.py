@@ -57,8 +57,8 @@ class ScanLog:
 
 def _chosen(aims: list[float], width: int) -> Bool[np.ndarray, "n w"]:
     """The rotation closest to each aim (rad)."""
-    apart = np.exp(1j * (turn_of_columns(np.arange(width), width) - np.array(aims)[:, None]))
-    return np.arange(width) == apart.real.argmax(axis=1)[:, None]
+    agreement = np.cos(turn_of_columns(np.arange(width), width) - np.array(aims)[:, None])
+    return np.arange(width) == agreement.argmax(axis=1)[:, None]
 
 
 def _left_to_right(width: int) -> Int64[np.ndarray, " width"]:

@@ -3,12 +3,10 @@
 import base64
 import io
 import os
-from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 from jaxtyping import Num
@@ -18,7 +16,6 @@ from PIL import Image as PillowImage
 
 from tussock.world.atomic import replacing
 
-from ..models import MODELS
 from .layout import fit_texts
 
 STYLE: Any = {
@@ -29,14 +26,9 @@ STYLE: Any = {
 }
 ROUTE_COLOUR, PATH_COLOUR, CURVE_COLOUR = "#2f6bff", "#e6352b", "#333333"
 GOOD_COLOUR, SOFT_COLOUR = "#2b8a6f", "#9aa3ad"
-MODEL_COLOURS = (  # told apart by most people; models of tussock have them in turn
-    "#2f6bff", "#e6352b", "#2b8a6f", "#8a6100", "#7b4fb5", "#00a3c4", "#e07b00", "#c2338f", "#5a6b1f", "#333333", "#7fa7ff", "#f2918b",
-    "#7cc9b0", "#cfa34a", "#b99be0", "#7fd6e8", "#9aa3ad", "#efb3d7", "#b5c46f",
-)  # fmt: skip
 WIDE, TALL = (7.2, 2.9), (7.2, 5.6)  # inches
 HANDLE, CHARACTER = 0.5, 0.08  # inches that a line and a letter take in a legend
 DPI = 130
-MARKERS = "osD^vPX"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,23 +44,6 @@ class Image:
     data: str
     width: int
     height: int
-
-
-def model_colour(model: str) -> str:
-    """The colour of a model, by its name or spec: the same in all reports."""
-    name = model.split(" ")[0]
-    known = list(MODELS.builtin)
-    return MODEL_COLOURS[(known.index(name) if name in known else crc32(name.encode())) % len(MODEL_COLOURS)]
-
-
-def model_markers(models: Iterable[str]) -> list[str]:
-    """A marker for each of several models, by which those of one colour differ."""
-    had: Counter[str] = Counter()
-    markers = []
-    for colour in map(model_colour, models):
-        markers.append(MARKERS[had[colour] % len(MARKERS)])
-        had[colour] += 1
-    return markers
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> Image:

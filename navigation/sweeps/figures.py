@@ -20,10 +20,9 @@ from ..reports.drawing import (
     draw_panorama,
     from_zero,
     legend_above,
-    model_colour,
-    model_markers,
 )
 from ..reports.maps import draw_map, draw_route, map_axes
+from .model_colours import model_colour, model_markers
 from .statistics import MEASURES, SHARES, axis_label, by_axis, choice_label
 
 COLOURS = (ROUTE_COLOUR, PATH_COLOUR, GOOD_COLOUR, "#8a6100", "#7b4fb5", CURVE_COLOUR, SOFT_COLOUR)

@@ -15,9 +15,8 @@ from ...reports.drawing import (
     empty_figure,
     from_zero,
     legend_above,
-    model_colour,
-    model_markers,
 )
+from ...sweeps.model_colours import model_colour, model_markers
 from .protocol import Item, models_in
 
 COLOURS = (ROUTE_COLOUR, GOOD_COLOUR, PATH_COLOUR, SOFT_COLOUR, CURVE_COLOUR)
