@@ -116,3 +116,6 @@ MEASUREMENTS: dict[str, Measurement] = {
     name: replication(name, arguments, tables=tables, texts=texts)
     for name, (arguments, tables, texts) in FULL_SIZE.items()
 }
+MEASUREMENTS["thesis"] = Measurement(
+    "`tussock replicate thesis`", measure_thesis, {"claims": thesis_table, "count": thesis_count}, slow=True
+)

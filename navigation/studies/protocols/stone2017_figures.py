@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from ...reports.drawing import CURVE_COLOUR, MARKERS, PATH_COLOUR, SOFT_COLOUR, canvas, from_zero, legend_above
+from ...reports.drawing import CURVE_COLOUR, PATH_COLOUR, SOFT_COLOUR, canvas, from_zero, legend_above
+from ...sweeps.model_colours import MARKERS
 from .figures import COLOURS
 
 CIRCLE = 20.0  # units about the nest
