@@ -21,6 +21,8 @@ from protocol_tables import (
     number,
     shares_by_release,
     strategies,
+    thesis_count,
+    thesis_table,
 )
 
 Texts = Mapping[str, Callable[[Values], str]]
