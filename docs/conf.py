@@ -37,9 +37,8 @@ exclude_patterns = [
 myst_heading_anchors = 4
 suppress_warnings = ["myst.header"]  # some pages begin a section two levels below the last
 
-# Notebooks are made of the scripts in docs/notebooks, and run when their code has changed; see write_notebooks.
-nb_execution_mode = "cache"
-nb_execution_cache_path = str(HERE / "_build" / ".jupyter_cache")
+# Notebooks are made of the scripts in docs/notebooks, and run; see write_notebooks.
+nb_execution_mode = "force"  # what a notebook shows depends on tussock, not on the notebook alone
 nb_execution_timeout = 900
 nb_execution_raise_on_error = True
 nb_output_stderr = "remove"  # progress and remarks, which depend on how long it takes and where files are
@@ -72,12 +71,12 @@ html_show_sphinx = False
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
-    app.connect("config-inited", run_notebooks_as_recipes)
+    app.connect("config-inited", skip_notebooks_with_recipes)
     app.connect("builder-inited", lambda _: write_notebooks(HERE / "notebooks"))
     app.connect("source-read", offer_download)
 
 
-def run_notebooks_as_recipes(app: Any, config: Any) -> None:
+def skip_notebooks_with_recipes(app: Any, config: Any) -> None:
     """Where the recipes are not run (`-D plot_gallery=0`), the notebooks are not run either."""
     if str(config.plot_gallery) in ("0", "False"):
         config.nb_execution_mode = "off"

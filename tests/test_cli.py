@@ -29,6 +29,7 @@ from tussock.render.renderer import open_renderer
 from tussock.world.files import read_world, write_world
 from tussock.world.meshes.reading import MeshReading
 from tussock.world.obstacles import clearance
+from tussock.world.params import DESCRIPTIONS, WORLDS
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
@@ -665,3 +666,9 @@ def test_of_two_runs_into_one_folder_at_once_one_is_refused(tmp_path):
     errors = [running.communicate()[1] for running in both]
     assert sorted(running.returncode for running in both) == [0, 2]
     assert "already holds a run" in "".join(errors)
+
+
+def test_each_world_is_listed_with_what_it_is(capfd):
+    worlds = printed(capfd, "world", "--list")["worlds"]
+    assert set(DESCRIPTIONS) == set(WORLDS.builtin) <= set(worlds)
+    assert tussock(capfd, "world")[0] == 2

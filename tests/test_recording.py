@@ -461,7 +461,7 @@ def panels_of(recording: Path) -> set[str]:
 
 PANELS = {
     "The learned view it recognises",
-    "Familiarity above the least, by degrees to the right (red: turned there, grey: not compared)",
+    "Familiarity above the least, by degrees to the right (red: chosen, grey: not compared)",
     "What it steers by",
     "Distance from the goal (m)",
 }
@@ -470,7 +470,7 @@ PANELS = {
 def test_there_are_panels_for_what_there_is_only(agent, recorded, tmp_path):
     assert panels_of(recorded[0]) == {
         "The learned view it recognises",
-        "Familiarity above the least, by degrees to the right (red: turned there, grey: not compared)",
+        "Familiarity above the least, by degrees to the right (red: chosen, grey: not compared)",
     }
     (step, *_) = agent.walk(agent.start())
     nothing = Shown()

@@ -237,7 +237,7 @@ WORLDS = Registry(
     "world",
     {name: f"{__name__}:{where}" for name, where in PRESETS.items()} | {"orchard": "tussock.world.orchard:orchard"},
 )
-SENTENCES = {  # what the worlds of tussock are
+DESCRIPTIONS = {  # what the worlds of tussock are
     "tussock-field": "Tussocks and short grass, bushes and trees about it; most results are of it",
     "meadow": "Thin grass on bare ground, few tussocks",
     "scrub": "Dry scrub on red ground: bushes, tussocks, stones",

@@ -39,8 +39,8 @@ class PrintedProgress:
 
     def reached(self, done: int) -> float:
         """How much is done in a second, of the work that was done since this began (1/s)."""
-        if self.before is None:
-            self.before = done
+        if self.before is None:  # what led to the first call is not counted: it may be other work
+            self.before, self.began = done, time.monotonic()
         self.rate = (done - self.before) / max(time.monotonic() - self.began, 1e-9)
         return self.rate
 

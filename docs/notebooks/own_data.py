@@ -27,7 +27,6 @@ import numpy as np
 import pandas as pd
 from PIL import Image
 
-import tussock
 from tussock import (
     Encoding,
     Experiment,
@@ -251,12 +250,13 @@ plt.show()
 #
 # ## A photo
 #
-# One panoramic photo is an array: height x width x 3 numbers from 0 to 255. Any encoding and model takes it. Here a picture of
-# tussock's own is turned by 90 degrees, and the visual compass finds out by how much. Put the path of your photo in its place.
+# One panoramic photo is an array: height x width x 3 numbers from 0 to 255. Any encoding and model takes it. Here a view of a
+# generated world is turned by 90 degrees, and the visual compass finds out by how much. For a photo of yours, put
+# `photo = np.asarray(Image.open("photo.jpg").convert("RGB"))` in its place.
 
 # %%
-PHOTO = Path(tussock.__file__).with_name("assets") / "panorama.png"
-photo = np.asarray(Image.open(PHOTO).convert("RGB"))
+with open_renderer(World.generate("tussock-field", seed=7)) as renderer:
+    photo = renderer.render(np.array([[5.0, 5.0, 0.0]]))[0, ..., :3]
 turned = np.roll(photo, photo.shape[1] // 4, axis=1)  # as after a turn of 90 degrees to the left
 encoding = Encoding.parse("grey | resize 6 | normalise")
 compass = VisualCompass().fit(encoding(photo[None]))

@@ -60,6 +60,7 @@ COMMANDS: dict[str, Any] = {name: each for group in GROUPS.values() for name, ea
 def overview() -> str:
     """All commands in their groups, a sentence each."""
     left = max(map(len, COMMANDS)) + 4
+    width = max(left + 20, min(get_terminal_size().columns, 100))
     lines = ["usage: tussock COMMAND [flags]", "", "Insect visual route navigation: worlds, views, familiarity, walks."]
     for title, commands in GROUPS.items():
         lines += ["", title]
@@ -67,7 +68,7 @@ def overview() -> str:
             first = f"  {name}".ljust(left)
             lines += wrap(
                 _sentence(command),
-                min(get_terminal_size().columns, 100),
+                width,
                 initial_indent=first,
                 subsequent_indent=" " * left,
             )

@@ -32,11 +32,11 @@ class WorldCommand(Command):
     def run(self) -> dict[str, Any]:
         from tussock.world.atomic import check_writable
         from tussock.world.files import write_world
-        from tussock.world.params import SENTENCES, WORLDS
+        from tussock.world.params import DESCRIPTIONS, WORLDS
         from tussock.world.scene import World
 
         if self.list:
-            return {"worlds": {name: {"what": SENTENCES.get(name, "")} for name in WORLDS.names}}
+            return {"worlds": {name: {"what": DESCRIPTIONS.get(name, "")} for name in WORLDS.names}}
         if self.out is None:
             raise SettingError("--out is missing: give the file to write, such as --out world.glb, or --list")
         check_writable(self.out)

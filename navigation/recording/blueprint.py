@@ -89,7 +89,7 @@ def _agent_views(max_deviation: float, shown: Shown) -> rrb.Vertical:
         views.append((1.3, rrb.Spatial2DView(origin="recognised", name="The learned view it recognises")))
     if shown.scan:
         hidden = rrb.PlotLegend(visible=False)
-        name = "Familiarity above the least, by degrees to the right (red: turned there, grey: not compared)"
+        name = "Familiarity above the least, by degrees to the right (red: chosen, grey: not compared)"
         views.append((1, rrb.BarChartView(origin="familiarity", name=name, plot_legend=hidden)))
     if shown.lines:
         legend = rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)

@@ -103,7 +103,10 @@ def serve(recording: Path) -> None:
         if has_display():
             webbrowser.open(address)
         with suppress(KeyboardInterrupt):
-            viewer.wait()
+            if viewer.wait():
+                raise MissingDependencyError(
+                    f"the viewer ended with code {viewer.returncode}; try --screenshot FILE.png"
+                )
 
 
 def has_display() -> bool:
@@ -113,12 +116,10 @@ def has_display() -> bool:
 
 def _free_port(wanted: int = 0) -> int:
     """A port on this machine that nothing listens at: the wanted one, if that is free."""
+    if wanted and not _answers(wanted):
+        return wanted
     with socket.socket() as free:
-        free.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            free.bind(("127.0.0.1", wanted))
-        except OSError:
-            free.bind(("127.0.0.1", 0))
+        free.bind(("127.0.0.1", 0))
         return free.getsockname()[1]
 
 
@@ -142,7 +143,7 @@ def viewer_program() -> str:
 def _viewer(options: list[str]) -> Iterator[subprocess.Popen]:
     """The viewer that came with rerun-sdk, running; ended with the block."""
     quiet = subprocess.DEVNULL if "--headless" in options else None
-    environment = os.environ | {"RERUN_ANALYTICS": "false", "RUST_LOG": "error"}
+    environment = {"RUST_LOG": "error"} | os.environ | {"RERUN_ANALYTICS": "false"}
     with subprocess.Popen([viewer_program(), *options], env=environment, stdout=quiet, stderr=quiet) as viewer:
         try:
             yield viewer

@@ -15,6 +15,7 @@ from ..experiment import Experiment
 from ..recording.run_folder import record_run
 
 WORST = "worst"  # folder of the recordings
+MAX_NAME = 80  # characters of a model in the name of a folder
 
 
 def worst_of(table: pd.DataFrame, count: int) -> list[str]:
@@ -28,7 +29,7 @@ def worst_of(table: pd.DataFrame, count: int) -> list[str]:
 
 def recording_folder(key: str, model: str) -> str:
     """Where the recording of a run is in the folder of its sweep: a folder that names the model, and ends with the run's key."""
-    return f"{WORST}/{re.sub(r'[^A-Za-z0-9.]+', '-', model).strip('-')}-{key}"
+    return f"{WORST}/{re.sub(r'[^A-Za-z0-9.]+', '-', model).strip('-')[:MAX_NAME]}-{key}"
 
 
 def recordings_in(out: Path) -> dict[str, str]:

@@ -104,7 +104,11 @@ def record_worst(sweep: Sweep, out: Path, count: int) -> list[Path]:
     with Store(out) as store:
         table = store.table()
         worst = worst_of(table[table["key"].isin(runs)], count)
-        folders = {key: out / recording_folder(key, store.row(key)["model"]) for key in worst}
+        there = recordings_in(out)
+        folders = {
+            key: (out / there[key]).parent if key in there else out / recording_folder(key, store.row(key)["model"])
+            for key in worst
+        }
         try:
             for key, folder in folders.items():
                 record_again(runs[key], store.row(key), folder)

@@ -20,7 +20,7 @@ from ..failures import Cause, Diagnosis
 from ..reports.report import Command, Drawing, Section
 from ..training import training_source, training_views
 from .figures import view_and_match, walk_map
-from .recordings import recording_folder
+from .recordings import recordings_in
 
 
 def walk_section(number: int, key: str, row: dict[str, Any], steps: pd.DataFrame, folder: Path) -> Section:
@@ -39,9 +39,8 @@ def walk_section(number: int, key: str, row: dict[str, Any], steps: pd.DataFrame
     shown = step_to_show(row, steps)
     evidence = describe_evidence(steps.iloc[shown])
     caption = f"Step {shown}" + (f": {evidence}." if evidence else ".")
-    recorded = recording_folder(key, row["model"])
-    if (folder / recorded / "summary.json").exists():
-        caption += f" Its recording is {recorded}/recording.rrd."
+    if recorded := recordings_in(folder).get(key):
+        caption += f" Its recording is {recorded}."
     drawing = Drawing(
         names=(f"walk-{key}", f"view-{key}"),
         draw=lambda: _draw(row, steps, shown),

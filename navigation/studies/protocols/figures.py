@@ -94,7 +94,14 @@ def means_by_model(intervals: pd.DataFrame, measure: str, label: str) -> Figure:
     figure, axes = canvas((7.2, 0.8 + 0.34 * len(table)))
     axis, places = axes[0, 0], np.arange(len(table))[::-1]
     ends = [table["mean"] - table["low"], table["high"] - table["mean"]]
-    axis.barh(places, table["mean"], height=0.6, xerr=ends, color=ROUTE_COLOUR + "55", error_kw={"capsize": 2})
+    axis.barh(
+        places,
+        table["mean"],
+        height=0.6,
+        xerr=ends,
+        color=[model_colour(each) + "55" for each in table["model"]],
+        error_kw={"capsize": 2},
+    )
     axis.set(yticks=places, yticklabels=table["model"], xlabel=label, ylim=(-0.55, len(table) - 0.45))
     axis.grid(axis="x", color="#00000018")
     return figure
