@@ -19,6 +19,7 @@ import trimesh
 from commands import KEYS, TUSSOCK, Process, printed, process, process_json, tussock
 
 from tussock.navigation.cli.main import main
+from tussock.navigation.cli.options import WORLD
 from tussock.navigation.cli.overview import COMMANDS, GROUPS
 from tussock.navigation.evaluation import grid_positions
 from tussock.navigation.experiment import Experiment
@@ -671,4 +672,5 @@ def test_of_two_runs_into_one_folder_at_once_one_is_refused(tmp_path):
 def test_each_world_is_listed_with_what_it_is(capfd):
     worlds = printed(capfd, "world", "--list")["worlds"]
     assert set(DESCRIPTIONS) == set(WORLDS.builtin) <= set(worlds)
+    assert f"({', '.join(WORLDS.builtin)})" in WORLD
     assert tussock(capfd, "world")[0] == 2

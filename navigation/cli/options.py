@@ -15,7 +15,6 @@ import tyro
 
 from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
-from tussock.world.params import WORLDS
 
 from ..body import Body
 from ..displacement import Displacement
@@ -27,7 +26,7 @@ from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup
 
 WORLD = (
-    f"A preset's name ({', '.join(WORLDS.builtin)}), generated from a seed; its parameters may follow, as in "
+    "A preset's name (tussock-field, meadow, scrub, tiny, hay-meadow, woodland, orchard), generated from a seed; its parameters may follow, as in "
     "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
 )
 
