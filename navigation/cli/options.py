@@ -26,8 +26,8 @@ from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny, hay-meadow, woodland, orchard), generated from a seed; its parameters may follow, as in "
-    "'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
+    "A preset's name (tussock-field, meadow, scrub, tiny, hay-meadow, woodland, orchard), generated from a seed; its parameters may "
+    "follow, as in 'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
 )
 
 
