@@ -74,7 +74,7 @@ def test_no_command_shows_them_all_and_a_wrong_one_is_one_line(capfd):
     assert all(name in out for name in COMMANDS)
     code, out, err = tussock(capfd, "wrold")
     assert (code, out) == (2, "")
-    assert err == "tussock: there is no command 'wrold' (did you mean 'world'?); tussock --help lists all\n"
+    assert err == "tussock: unknown command 'wrold' (did you mean 'world'?); tussock --help lists all\n"
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])

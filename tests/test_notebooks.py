@@ -10,7 +10,7 @@ import nbformat
 import pytest
 
 NOTEBOOKS = Path(__file__).parents[1] / "docs" / "notebooks"
-LONGEST = 900  # seconds: what a lesson of two hours can spare for computing
+LONGEST = 900  # seconds: what a practical of two hours can spare for computing
 NAMES = ["practical", "own_data", "own_model_and_navigator"]
 
 

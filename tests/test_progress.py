@@ -1,4 +1,4 @@
-"""Progress of long work: printed where nobody says otherwise, silent on request, and a line now and then where there is no terminal."""
+"""Progress of long work: printed by default, silent on request, and a line now and then where there is no terminal."""
 
 import numpy as np
 import pytest

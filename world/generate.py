@@ -29,7 +29,11 @@ STREAMS = (  # append new ones: old seeds stay as they are
     "herb", "culm", "litter", "inner_tree", "speckles", "hedge",
 )  # fmt: skip
 SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "leaf": leaf, "herb": herb}
-AT_ONCE = {"grass": grass, "culm": culms, "litter": litter}  # kinds with so many plants that they are shaped together
+AT_ONCE = {
+    "grass": grass,
+    "culm": culms,
+    "litter": litter,
+}  # of these there are thousands: all of a kind are shaped at once
 
 
 def generate_plants(params: WorldParams, seed: int) -> Plant:

@@ -27,22 +27,21 @@ class PrintedProgress:
         self.began = time.monotonic()
         self.next = self.began + self.FIRST
         self.before: int | None = None  # done before this began
-        self.rate = 0.0
 
     def __call__(self, done: int, total: int) -> None:
         """Print how far it is, unless that was printed a moment ago."""
-        if self.reached(done) and (time.monotonic() > self.next or (self.to_the_end and done == total)):
+        rate = self.reached(done)
+        if rate and (time.monotonic() > self.next or (self.to_the_end and done == total)):
             self.next = time.monotonic() + self.PAUSE
             counted = f"{done} of {total} {self.unit}".rstrip()
-            minutes = (total - done) / self.rate / 60
-            print(f"{self.what}: {counted}, {self.rate:.3g} a second, {minutes:.2g} min left", file=sys.stderr)
+            minutes = (total - done) / rate / 60
+            print(f"{self.what}: {counted}, {rate:.3g} a second, {minutes:.2g} min left", file=sys.stderr)
 
     def reached(self, done: int) -> float:
         """How much is done in a second, of the work that was done since this began (1/s)."""
         if self.before is None:  # what led to the first call is not counted: it may be other work
             self.before, self.began = done, time.monotonic()
-        self.rate = (done - self.before) / max(time.monotonic() - self.began, 1e-9)
-        return self.rate
+        return (done - self.before) / max(time.monotonic() - self.began, 1e-9)
 
 
 def printed(progress: Progress | None, what: str, unit: str = "") -> Progress:

@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(overview())
         sys.exit(0 if arguments else 2)
     if arguments[0] not in COMMANDS:
-        fail(f"there is no command {arguments[0]!r}{suggestion(arguments[0], COMMANDS)}; tussock --help lists all")
+        fail(f"unknown command {arguments[0]!r}{suggestion(arguments[0], COMMANDS)}; tussock --help lists all")
     command = tyro.cli(
         choice_of({arguments[0]: command_of(*arguments[:2])}),
         prog="tussock",

@@ -69,7 +69,7 @@ def progress_of_parts() -> Iterator[Callable[[str, int, int], object]]:
 
 @contextmanager
 def progress(what: str, unit: str, *, verbose: bool = False) -> Iterator[Callable[..., object]]:
-    """Show progress on standard error, as a bar or, where that is no terminal, as a line now and then; gives a function
+    """Show progress on standard error, as a bar or, where that is not a terminal, as a line now and then; gives a function
     report(done, total, description=what).
 
     verbose: for work of hours: show the rate as well, and say when all is done.

@@ -1,4 +1,4 @@
-"""The familiarity of headings, as a recording shows it: bars from left to right, those that were not compared, and the one turned to."""
+"""The familiarity of headings, as a recording shows it: bars from left to right, those that were not compared, and the chosen one."""
 
 import numpy as np
 import rerun as rr
@@ -30,12 +30,7 @@ class ScanLog:
         if not scans:
             return
         familiarity = np.stack([step.familiarity for step in scans if step.familiarity is not None])
-        compared = np.stack(
-            [
-                np.ones(len(row), dtype=bool) if step.scanned is None else step.scanned
-                for step, row in zip(scans, familiarity, strict=True)
-            ]
-        )
+        compared = np.stack([step.scanned for step in scans if step.scanned is not None])
         chosen = _chosen([step.aim for step in scans], familiarity.shape[1])
         heights = familiarity - familiarity.min(axis=1, keepdims=True)
         self._chart(COMPARED, scans, np.where(compared, heights, 0))

@@ -94,9 +94,7 @@ def serve(recording: Path) -> None:
     with _viewer(options) as viewer:
         while not (_answers(page) and _answers(data)):
             if viewer.poll() is not None:
-                raise MissingDependencyError(
-                    f"the viewer ended with code {viewer.returncode}; try --screenshot FILE.png"
-                )
+                raise _ended(viewer)
             time.sleep(0.1)
         address = f"http://127.0.0.1:{page}/?url={quote(f'rerun+http://127.0.0.1:{data}/proxy', safe='')}"
         log.info(f"{recording} is shown to browsers on this machine, until Ctrl-C, at\n    {address}")
@@ -104,9 +102,12 @@ def serve(recording: Path) -> None:
             webbrowser.open(address)
         with suppress(KeyboardInterrupt):
             if viewer.wait():
-                raise MissingDependencyError(
-                    f"the viewer ended with code {viewer.returncode}; try --screenshot FILE.png"
-                )
+                raise _ended(viewer)
+
+
+def _ended(viewer: subprocess.Popen) -> MissingDependencyError:
+    """The error of a viewer that ended by itself."""
+    return MissingDependencyError(f"the viewer ended with code {viewer.returncode}; try --screenshot FILE.png")
 
 
 def has_display() -> bool:
