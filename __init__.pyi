@@ -45,6 +45,7 @@ from .navigation import record_run as record_run
 from .navigation import register as register
 from .navigation import rotational as rotational
 from .navigation import run_sweep as run_sweep
+from .navigation import save_film as save_film
 from .navigation import save_model as save_model
 from .navigation import train as train
 from .navigation import training_poses as training_poses

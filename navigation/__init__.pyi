@@ -30,6 +30,7 @@ from .models.base import FamiliarityModel as FamiliarityModel
 from .models.files import TrainedModel as TrainedModel
 from .models.files import load_model as load_model
 from .models.files import save_model as save_model
+from .recording.film import save_film as save_film
 from .recording.log import Recording as Recording
 from .recording.run_folder import record_run as record_run
 from .registry import register as register

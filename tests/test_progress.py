@@ -13,7 +13,7 @@ from tussock.navigation.training import training_views
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
 from tussock.world import progress
-from tussock.world.progress import PrintedProgress
+from tussock.world.progress import PrintedProgress, in_words
 from tussock.world.scene import World
 
 
@@ -41,7 +41,7 @@ def test_a_line_says_how_much_how_fast_and_how_long(clock, capsys):
     report(20, 80)  # as where a sweep goes on
     clock[0] = 10.0
     report(40, 80)
-    assert capsys.readouterr().err == "walking: 40 of 80 runs, 2 a second, 0.33 min left\n"
+    assert capsys.readouterr().err == "walking: 40 of 80 runs, 2 a second, 20 s left\n"
 
 
 def test_short_work_says_nothing_unless_its_end_is_wanted(clock, capsys):
@@ -81,6 +81,13 @@ def test_each_part_of_a_command_has_its_lines_in_a_pipe(clock, capsys):
                 clock[0] += 3.0
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
-        "learning: 1 of 2, 0.333 a second, 0.05 min left",
-        "walking: 1 of 2, 0.333 a second, 0.05 min left",
+        "learning: 1 of 2, 0.333 a second, 3 s left",
+        "walking: 1 of 2, 0.333 a second, 3 s left",
     ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0, "0 s"), (89, "89 s"), (90, "2 min"), (5399, "90 min"), (5400, "1.5 h"), (90_000, "25.0 h")]
+)
+def test_a_duration_is_said_shortly(seconds, words):
+    assert in_words(seconds) == words

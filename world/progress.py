@@ -34,14 +34,21 @@ class PrintedProgress:
         if rate and (time.monotonic() > self.next or (self.to_the_end and done == total)):
             self.next = time.monotonic() + self.PAUSE
             counted = f"{done} of {total} {self.unit}".rstrip()
-            minutes = (total - done) / rate / 60
-            print(f"{self.what}: {counted}, {rate:.3g} a second, {minutes:.2g} min left", file=sys.stderr)
+            left = in_words((total - done) / rate)
+            print(f"{self.what}: {counted}, {rate:.3g} a second, {left} left", file=sys.stderr)
 
     def reached(self, done: int) -> float:
         """How much is done in a second, of the work that was done since this began (1/s)."""
         if self.before is None:  # what led to the first call is not counted: it may be other work
             self.before, self.began = done, time.monotonic()
         return (done - self.before) / max(time.monotonic() - self.began, 1e-9)
+
+
+def in_words(seconds: float) -> str:
+    """A duration, as short as people say it: 40 s, 12 min, 2.5 h."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 90 * 60 else f"{seconds / 3600:.1f} h"
 
 
 def printed(progress: Progress | None, what: str, unit: str = "") -> Progress:

@@ -142,11 +142,17 @@ def _write(image: Frame, text: str, at: tuple[int, int], size: float = 0.55) -> 
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
 
 
-def save_film(recording: Path, film: Path, *, steps_per_second: float = 10.0, progress: Progress | None = None) -> int:
+def save_film(
+    recording: str | os.PathLike,
+    film: str | os.PathLike,
+    *,
+    steps_per_second: float = 10.0,
+    progress: Progress | None = None,
+) -> int:
     """Write a recording as a film.
 
     Args:
-        recording: The recording.
+        recording: A run's recording, the file recording.rrd in its folder.
         film: File to write: .mp4 (needs the package imageio-ffmpeg) or .gif.
         steps_per_second: Speed.
         progress: Called with how many steps are drawn, of how many; None prints a line where it takes long, `no_progress` none.
@@ -160,6 +166,7 @@ def save_film(recording: Path, film: Path, *, steps_per_second: float = 10.0, pr
         MissingDependencyError: Where imageio-ffmpeg is needed, and missing.
     """
     progress = printed(progress, "drawing", "steps")
+    recording, film = Path(recording), Path(film)
     writers = {".mp4": _mp4, ".gif": _gif}
     if film.suffix.lower() not in writers:
         raise FileError(f"{film}: a film is written as .mp4 or .gif")
