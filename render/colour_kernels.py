@@ -21,9 +21,31 @@ def _cross(ax, ay, az, bx, by, bz):
 
 
 @compiled(inline="always")
-def weights_along(corners, label, view, cos, sin):
+def _eye_of(view, frame):
+    """Where the eye is in the world (m)."""
+    if frame is None:
+        return view.x, view.y, view.z
+    return frame[0, 0], frame[0, 1], frame[0, 2]
+
+
+@compiled(inline="always")
+def _turned(p, frame):
+    """A vector in the frame of the eye."""
+    if frame is None:
+        return p
+    px, py, pz = p
+    return (
+        frame[1, 0] * px + frame[1, 1] * py + frame[1, 2] * pz,
+        frame[2, 0] * px + frame[2, 1] * py + frame[2, 2] * pz,
+        frame[3, 0] * px + frame[3, 1] * py + frame[3, 2] * pz,
+    )
+
+
+@compiled(inline="always")
+def weights_along(corners, label, view, frame, cos, sin):
     """The weights of the corners of a triangle in a column of rays, up to a common factor: three numbers, then three slopes over t."""
-    k, x, y, z = np.uintp(label), view.x, view.y, view.z
+    k = np.uintp(label)
+    x, y, z = _eye_of(view, frame)
     ax, ay, az = corners[k, 0, 0] - x, corners[k, 0, 1] - y, corners[k, 0, 2] - z
     bx, by, bz = corners[k, 1, 0] - x, corners[k, 1, 1] - y, corners[k, 1, 2] - z
     cx, cy, cz = corners[k, 2, 0] - x, corners[k, 2, 1] - y, corners[k, 2, 2] - z
@@ -31,6 +53,9 @@ def weights_along(corners, label, view, cos, sin):
     qx, qy, qz = _cross(cx, cy, cz, ax, ay, az)
     rx, ry, rz = _cross(ax, ay, az, bx, by, bz)
     sign = 1.0 if ax * px + ay * py + az * pz > 0.0 else -1.0
+    px, py, pz = _turned((px, py, pz), frame)
+    qx, qy, qz = _turned((qx, qy, qz), frame)
+    rx, ry, rz = _turned((rx, ry, rz), frame)
     cos, sin = sign * cos, sign * sin
     return px * cos + py * sin, qx * cos + qy * sin, rx * cos + ry * sin, sign * pz, sign * qz, sign * rz
 
@@ -139,7 +164,7 @@ def ray_colour(uv, corner_colours, texels, textures, products, label, k, weights
 
 
 @compiled(error_model="numpy", uses=(culling_kernels,))  # `view` is a type of that module
-def colour_rays(lookup, colours, directions, tangents, view, keys):
+def colour_rays(lookup, colours, directions, tangents, view, frame, keys):
     """Replace the keys of columns view.start..view.stop-1 by the colours of their rays, packed as `colours` are."""
     corners, index, _, uv, corner_colours, texels, textures, _, products = lookup
     for column in range(view.start, view.stop):
@@ -153,7 +178,7 @@ def colour_rays(lookup, colours, directions, tangents, view, keys):
                 keys[j, r] = colours[np.uintp(label)]
                 continue
             if label != before:
-                before, weights = label, weights_along(corners, label, view, directions[0, j], directions[1, j])
+                before, weights = label, weights_along(corners, label, view, frame, directions[0, j], directions[1, j])
             keys[j, r] = ray_colour(uv, corner_colours, texels, textures, products, label, k, weights, tangents[r])
 
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tussock.world.errors import InputError, MissingDependencyError
+from tussock.world.errors import InputError, MissingDependencyError, SettingError
 from tussock.world.scene import World
 
 from .compile import SIMULATED, config
 from .eye import Eye
-from .poses import Poses, Views, poses_of_eye
+from .poses import AnyPoses, Views, poses_of_eye
 from .scanline_kernels import find_directions
 from .scene_arrays import Scene
 
@@ -66,13 +66,15 @@ class CudaRenderer:
         """In another process it is opened anew."""
         return CudaRenderer, (self.world, self.eye)
 
-    def render(self, poses: Poses) -> Views:
+    def render(self, poses: AnyPoses) -> Views:
         """See `Renderer.render`. Threads take turns.
 
         Raises:
-            InputError: Also where the memory of the GPU is too small.
+            InputError: Also where the memory of the GPU is too small, and for an eye that pitches or rolls.
         """
         eyes = poses_of_eye(self.world, self.eye, poses)
+        if eyes[:, 4:].any():
+            raise SettingError("the cuda renderer draws level eyes only; for pitch and roll use the cpu renderer")
         views = np.empty((len(eyes), self.eye.height, self.eye.width, 4), dtype=np.uint8)
         with self._lock, _enough_memory():
             if self._triangles is None:
@@ -82,7 +84,7 @@ class CudaRenderer:
                 self._draw(eyes[batch], views[batch])
         return views
 
-    def _draw(self, eyes: Float[np.ndarray, "n 4"], views: Views) -> None:
+    def _draw(self, eyes: Float[np.ndarray, "n 6"], views: Views) -> None:
         """Draw one batch of views."""
         cuda, threads, (clear, narrow, wide, average) = self._cuda, self._threads, self._kernels
         n, (*_, columns, rows) = len(eyes), self._numbers
@@ -97,7 +99,14 @@ class CudaRenderer:
         keys, pixels, queue, queued = self._memory
         keys, pixels = keys[:n], pixels[:n]
         clear[(-(-columns * rows // threads), n), threads](keys, queued)
-        where = self._numbers, self._tangents, cuda.to_device(eyes), cuda.to_device(directions), self._lookup, keys
+        where = (
+            self._numbers,
+            self._tangents,
+            cuda.to_device(np.ascontiguousarray(eyes[:, :4])),
+            cuda.to_device(directions),
+            self._lookup,
+            keys,
+        )
         triangles = len(self._triangles[1])
         if triangles:
             narrow[(-(-triangles // threads), n), threads](*self._triangles, *where, queue, queued)

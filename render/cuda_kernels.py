@@ -17,7 +17,7 @@ from numba import cuda as numba_cuda
 from .colour_kernels import PLAIN, opaque, ray_colour, weights_along
 from .compile import SIMULATED
 from .culling_kernels import ATAN_ERROR, ERROR_32, LEAF, View, key_of, row_of
-from .scanline_kernels import bound, corner, covered, cross, depth_plane
+from .scanline_kernels import bound, covered, cross, depth_plane
 
 cuda: Any = numba_cuda  # its types are those of Python, not of kernels
 THREADS = 128  # in a block
@@ -46,6 +46,12 @@ def _plus_product(total, weight, value):
 def _view_of(eyes, numbers, v):
     top, rows_per_rad, width, height = numbers
     return View(eyes[v, 0], eyes[v, 1], eyes[v, 3], eyes[v, 2], top, rows_per_rad, width, height, 0, width)
+
+
+@_device
+def corner(corners, k, i, view):
+    """Corner k of triangle i, seen from the eye."""
+    return corners[0, k, i] - view.x, corners[1, k, i] - view.y, corners[2, k, i] - view.z
 
 
 @_device
@@ -119,7 +125,7 @@ def _column_drawer(textured: bool) -> Any:
         base, slope = plane[0] * cos + plane[1] * sin, plane[2]
         if textured:
             corners, index, holes, uv, corner_colours, texels, textures, thresholds, _ = lookup
-            has_holes, k, weights = holes[label], index[label], weights_along(corners, label, view, cos, sin)
+            has_holes, k, weights = holes[label], index[label], weights_along(corners, label, view, None, cos, sin)
         for row in range(first, last + 1):
             t, key = tangents[row], key_of(base + slope * tangents[row], label)
             if key <= keys[v, column, row]:
@@ -194,7 +200,7 @@ def averaging_kernel(textured: bool) -> Any:
             corners, index, _, uv, corner_colours, texels, textures, _, products = lookup
             k = np.int64(index[label])
             if k != PLAIN:
-                shares = weights_along(corners, label, view, cos, sin)
+                shares = weights_along(corners, label, view, None, cos, sin)
                 return ray_colour(uv, corner_colours, texels, textures, products, label, k, shares, t)
         return colours[label]
 

@@ -107,9 +107,9 @@ def _find_corners(corners, n, view, work):
     _, per_rad, middle, _, _ = _in_float32(view)
     for k in range(3):
         for i in range(n):  # without branches, so that it is vectorised
-            dx, dy = np.float32(corners[0, k, i] - view.x), np.float32(corners[1, k, i] - view.y)
+            dx, dy = np.float32(corners[0, k, i]), np.float32(corners[1, k, i])
             work[k * LEAF + i] = middle - _atan2_32(dy, dx) * per_rad
-            work[(3 + k) * LEAF + i] = np.float32(corners[2, k, i] - view.z) / (np.sqrt(dx * dx + dy * dy) + _TINY)
+            work[(3 + k) * LEAF + i] = np.float32(corners[2, k, i]) / (np.sqrt(dx * dx + dy * dy) + _TINY)
 
 
 @compiled(error_model="numpy")
@@ -121,7 +121,7 @@ def find_candidates(corners, n, view, work, found):
     between the least and the greatest t at which edges cross it. For others the least and the greatest t of the corners must do.
 
     Args:
-        corners: (3, 3, LEAF) see `TriangleTree`.
+        corners: (3, 3, LEAF) of the triangles of a leaf, as seen from the eye (m).
         n: Triangles in the leaf.
         work: (9 * LEAF,) of float32. Some of it is to work in. The seventh LEAF numbers become the first column of each triangle
             (0..width-1), the eighth its last one (which may exceed width - 1).
@@ -181,8 +181,21 @@ def key_of(nearness, label):
     return np.int64(np.float32(nearness).view(np.int32)) << 32 | label
 
 
+@compiled(inline="always")
+def _turned_box(boxes, k, frame, axis):
+    """The least and the greatest coordinate of a box along an axis (1..3) of the frame of a tilted eye."""
+    u, v, w = frame[axis, 0], frame[axis, 1], frame[axis, 2]
+    x0, y0, z0 = np.float64(boxes[0, k]), np.float64(boxes[1, k]), np.float64(boxes[2, k])
+    dx, dy, dz = boxes[3, k] - x0, boxes[4, k] - y0, boxes[5, k] - z0
+    at = u * (x0 - frame[0, 0]) + v * (y0 - frame[0, 1]) + w * (z0 - frame[0, 2])
+    low = at + min(u, 0.0) * dx + min(v, 0.0) * dy + min(w, 0.0) * dz
+    high = at + max(u, 0.0) * dx + max(v, 0.0) * dy + max(w, 0.0) * dz
+    empty = dx < 0.0
+    return (_INF if empty else np.float32(low)), (-_INF if empty else np.float32(high))
+
+
 @compiled(error_model="numpy")
-def find_boxes(boxes, begin, n, view, work):
+def find_boxes(boxes, begin, n, view, frame, work):
     """Find out in which pixels boxes begin..begin+n-1 may be seen: all of those, and few others.
 
     A circle around a box, of radius r at the distance d, has the angle 2 asin(q), q = r / d; asin(q) <= q + (pi / 2 - 1) q^3.
@@ -198,8 +211,13 @@ def find_boxes(boxes, begin, n, view, work):
     pad, row_pad = ERROR_32 + np.float32(1e-5), ERROR_32 * rows_per_rad + np.float32(1e-5)
     for i in range(n):  # without branches, so that it is vectorised
         k = begin + i
-        x0, y0, z0 = np.float32(boxes[0, k] - x), np.float32(boxes[1, k] - y), np.float32(boxes[2, k] - z)
-        x1, y1, z1 = np.float32(boxes[3, k] - x), np.float32(boxes[4, k] - y), np.float32(boxes[5, k] - z)
+        if frame is None:
+            x0, y0, z0 = np.float32(boxes[0, k] - x), np.float32(boxes[1, k] - y), np.float32(boxes[2, k] - z)
+            x1, y1, z1 = np.float32(boxes[3, k] - x), np.float32(boxes[4, k] - y), np.float32(boxes[5, k] - z)
+        else:
+            x0, x1 = _turned_box(boxes, k, frame, 1)
+            y0, y1 = _turned_box(boxes, k, frame, 2)
+            z0, z1 = _turned_box(boxes, k, frame, 3)
         nx, ny, fx, fy = max(zero, max(x0, -x1)), max(zero, max(y0, -y1)), max(-x0, x1), max(-y0, y1)
         near, far = np.sqrt(nx * nx + ny * ny), np.sqrt(fx * fx + fy * fy)
         dx, dy, sx, sy = x1 - x0, y1 - y0, x0 + x1, y0 + y1
@@ -221,7 +239,7 @@ def find_boxes(boxes, begin, n, view, work):
 
 
 @compiled
-def push_parts(boxes, box, view, work, stack, size):
+def push_parts(boxes, box, view, frame, work, stack, size):
     """Put the parts of a box on the stack, the nearest on top, if they may be seen.
 
     Args:
@@ -236,7 +254,7 @@ def push_parts(boxes, box, view, work, stack, size):
     begin, n = 2 * box, 2
     while n < FAN and begin < boxes.shape[1] // 2:  # parts of parts
         begin, n = 2 * begin, 2 * n
-    find_boxes(boxes, begin, n, view, work)
+    find_boxes(boxes, begin, n, view, frame, work)
     bottom = size
     for k in range(n):
         if work[6 * FAN + k] == 0:

@@ -5,17 +5,18 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float, Int64
 
+from tussock.world.full_pose import eye_axes
 from tussock.world.geometry import column_azimuths
 from tussock.world.scene import World
 
 from .eye import Eye
-from .poses import Poses, poses_of_eye
+from .poses import AnyPoses, poses_of_eye
 from .triangle_tree import tree_of
 
 RAY_SPACING = np.radians(5.0)  # rad
 
 
-def covered_within(world: World, eye: Eye, poses: Poses, distance: float) -> Float[np.ndarray, " n"]:
+def covered_within(world: World, eye: Eye, poses: AnyPoses, distance: float) -> Float[np.ndarray, " n"]:
     """Share of what an eye sees in which something is closer than a distance; the ground does not count.
 
     It casts rays RAY_SPACING apart, the same for every heading, and tests them as render/scanline.py does: a ray d meets the
@@ -25,7 +26,7 @@ def covered_within(world: World, eye: Eye, poses: Poses, distance: float) -> Flo
     Args:
         world: The world.
         eye: Its elevations, height and visible pixels are used.
-        poses: (n, 3) Where the eye is.
+        poses: (n, 3) or (n, 6) Where the eye is.
         distance: The distance (m).
 
     Returns:
@@ -38,8 +39,10 @@ def covered_within(world: World, eye: Eye, poses: Poses, distance: float) -> Flo
     which, close = which[solid], close[solid]
     shares = np.zeros(len(poses))
     for k in np.unique(which).tolist():  # a few; nothing is close to most
-        triangles = world.triangles[close[which == k]].astype(float) - position[k]
-        shares[k] = _covered(triangles, eye, poses[k, 2], distance, world.double_sided)
+        triangles, heading = world.triangles[close[which == k]].astype(float) - position[k], poses[k, 2]
+        if poses[k, 4:].any():  # a tilted eye looks ahead along x in its own frame
+            triangles, heading = triangles @ eye_axes(poses[k : k + 1])[0].T, 0.0
+        shares[k] = _covered(triangles, eye, heading, distance, world.double_sided)
     return shares
 
 

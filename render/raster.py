@@ -16,13 +16,14 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import InputError, SettingError
+from tussock.world.full_pose import eye_axes
 from tussock.world.scene import World
 from tussock.world.textures import Texturing
 
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
 from .gl import Context, Framebuffer, open_context
-from .poses import Poses, Views, poses_of_eye
+from .poses import AnyPoses, Views, poses_of_eye
 
 NEAR = 1e-4  # m; surfaces closer to the eye are not drawn. There is no far limit.
 
@@ -64,27 +65,25 @@ class RasterRenderer:
         """In another process it is opened anew."""
         return RasterRenderer, (self.world, self.eye, self.backend, self._face_size)
 
-    def render(self, poses: Poses) -> Views:
+    def render(self, poses: AnyPoses) -> Views:
         """See `Renderer.render`. Threads may share a renderer; they take turns."""
         if not self._free.alive:
             raise InputError("this renderer is closed; open another one")
         poses = poses_of_eye(self.world, self.eye, poses)
         views = np.empty((len(poses), self.eye.height, self.eye.width, 4), dtype=np.uint8)
         with self._context:
-            for pose, view in zip(poses, views, strict=True):
+            for position, axes, view in zip(poses[:, [0, 1, 3]], eye_axes(poses), views, strict=True):
                 for face in self._cubemap.faces:
-                    self._draw(face, pose)
+                    self._draw(face, position, axes)
                 self._framebuffer.read(self._atlas)
                 view[:] = self._cubemap.unwrap(self._atlas)
         return views
 
-    def _draw(self, face: Face, pose: Float[np.ndarray, " 4"]) -> None:
-        """Draw one face of the cube around the eye at a pose into its rows of the atlas."""
-        x, y, heading, z = pose
-        c, s = np.cos(heading), np.sin(heading)
-        right, up, forward = face.axes @ np.array([(c, s, 0), (-s, c, 0), (0, 0, 1)])
+    def _draw(self, face: Face, position: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> None:
+        """Draw one face of the cube around an eye (see `eye_axes`) into its rows of the atlas."""
+        right, up, forward = face.axes @ axes
         camera = np.eye(4)
-        camera[:3] = np.column_stack([right, up, -forward, (x, y, z)])
+        camera[:3] = np.column_stack([right, up, -forward, position])
         self._scene.set_pose(self._camera, camera)
         framebuffer, size = self._framebuffer, self._cubemap.size
 

@@ -7,7 +7,7 @@ from tussock.world.scene import World
 
 from .backends import BACKENDS
 from .eye import Eye
-from .poses import Poses, Views
+from .poses import AnyPoses, Views
 
 
 @runtime_checkable
@@ -24,11 +24,12 @@ class Renderer(Protocol):
     eye: Eye
     backend: str
 
-    def render(self, poses: Poses) -> Views:
+    def render(self, poses: AnyPoses) -> Views:
         """Draw the panoramas at some poses. Several threads may call this at once, as a recording does while its walk goes on.
 
         Args:
-            poses: (n, 3) x (m), y (m) and heading (rad).
+            poses: (n, 3) x (m), y (m) and heading (rad) of level eyes that stand on the ground, or (n, 6) full poses, which go on
+                with z (m), pitch and roll (rad), see `FullPose`.
 
         Returns:
             (n, height, width, 4) red, green, blue and alpha. Colour is the average over the solid angle of a pixel, the sky

@@ -15,6 +15,9 @@ The mathematics, for an eye at the origin. All rays of a column have the same az
   box is left out where no ray meets its outline (taken slightly too wide), or where each pixel that it may touch shows something
   nearer than its nearest corner. This changes no pixel, and the cost grows far more slowly than the number of triangles.
 
+- Pitch and roll. Everything is in the eye's own frame, so a tilted eye only turns the triangles first: those of the leaves that it
+  may see, and the boxes around them, which become the level boxes around the turned ones. A level eye needs none of this.
+
 - Textures. Where a ray meets a triangle with a texture, the texel there gives its colour; a triangle with holes is nearer than
   what lies behind it only for rays that meet no hole.
 
@@ -28,11 +31,12 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.errors import InputError, SettingError
+from tussock.world.full_pose import eye_axes
 from tussock.world.scene import World
 
 from .cores import core_count
 from .eye import Eye
-from .poses import Poses, Views, poses_of_eye
+from .poses import AnyPoses, Views, poses_of_eye
 from .scanline_kernels import draw_views
 from .scene_arrays import Scene
 
@@ -58,18 +62,23 @@ class ScanlineRenderer:
         self._threads = threads or core_count()
         self._pool: ThreadPoolExecutor | None = ThreadPoolExecutor(self._threads)
         # Drawing nothing compiles the loops, or loads what was compiled.
-        self._draw(np.empty((0, 4)), np.empty((0, eye.height, eye.width, 4), dtype=np.uint8), 0, eye.width)
+        self._draw(np.empty((0, 6)), np.empty((0, eye.height, eye.width, 4), dtype=np.uint8), 0, eye.width)
 
     def __reduce__(self):
         """In another process it is opened anew."""
         return ScanlineRenderer, (self.world, self.eye, self._threads)
 
-    def render(self, poses: Poses) -> Views:
+    def render(self, poses: AnyPoses) -> Views:
         """See `Renderer.render`. Each thread draws some of the poses, or a strip of columns where there is only one."""
         if self._pool is None:
             raise InputError("this renderer is closed; open another one")
         poses = poses_of_eye(self.world, self.eye, poses)
         views = np.empty((len(poses), self.eye.height, self.eye.width, 4), dtype=np.uint8)
+        tilted = poses[:, 4:].any(axis=1)
+        if tilted.any() and not tilted.all():  # a level view has the same bytes among tilted ones
+            for some in (tilted, ~tilted):
+                views[some] = self.render(poses[some])
+            return views
         if len(poses) == 1:
             edges = np.linspace(0, self.eye.width, self._threads + 1).astype(int).tolist()
             jobs = [(poses, views, start, stop) for start, stop in pairwise(edges) if start < stop]
@@ -83,13 +92,14 @@ class ScanlineRenderer:
             other.result()
         return views
 
-    def _draw(self, poses: Float[np.ndarray, "n 4"], views: Views, start: int, stop: int) -> None:
-        """Draw columns start..stop-1 of the views at some poses."""
+    def _draw(self, poses: Float[np.ndarray, "n 6"], views: Views, start: int, stop: int) -> None:
+        """Draw columns start..stop-1 of the views at some poses, which are all level or all tilted."""
+        frames = np.concatenate([poses[:, None, [0, 1, 3]], eye_axes(poses)], axis=1) if poses[:, 4:].any() else None
         try:
             keys = self._scratch.pop()
         except IndexError:
             keys = np.empty((self.eye.width * self.eye.rays, self.eye.height * self.eye.rays), dtype=np.int64)
-        draw_views(*self._scene, poses, start, stop, keys, views.view("<u4")[..., 0])
+        draw_views(*self._scene, poses, frames, start, stop, keys, views.view("<u4")[..., 0])
         self._scratch.append(keys)  # fresh memory costs more than drawing a small view
 
     def close(self) -> None:

@@ -1,8 +1,9 @@
 """The loops of the CPU renderer. Their mathematics is in scanline.py.
 
 colour_kernels.py has what makes colours of their keys; functions that call it say so, because numba notices a change in the file of a
-function, but not in the files of those that it calls. `lookup` is None in a plain world: numba compiles the loops anew for it, without
-the parts for textures. Arrays are passed on one by one, because numba counts the references to each array of a tuple.
+function, but not in the files of those that it calls. `lookup` is None in a plain world, and `frame` for a level eye: numba compiles the
+loops anew for these, without the parts for textures or for turning. Arrays are passed on one by one, because numba counts the references
+to each array of a tuple.
 """
 
 import numpy as np
@@ -21,9 +22,27 @@ def cross(a, b):
 
 
 @compiled(inline="always")
-def corner(corners, k, i, view):
-    """Corner k of triangle i, seen from the eye."""
-    return corners[0, k, i] - view.x, corners[1, k, i] - view.y, corners[2, k, i] - view.z
+def corner(corners, k, i):
+    """Corner k of triangle i."""
+    return corners[0, k, i], corners[1, k, i], corners[2, k, i]
+
+
+@compiled
+def find_corners(blocks, leaf, view, frame, corners):
+    """Write the corners of a leaf, as seen from the eye, into corners (3, 3, LEAF); for a tilted eye in its own frame."""
+    for k in range(3):
+        if frame is None:
+            for i in range(LEAF):
+                corners[0, k, i] = blocks[leaf, 0, k, i] - view.x
+                corners[1, k, i] = blocks[leaf, 1, k, i] - view.y
+                corners[2, k, i] = blocks[leaf, 2, k, i] - view.z
+        else:
+            for axis in range(3):
+                x, y, z = frame[1 + axis]
+                for i in range(LEAF):  # without branches, so that it is vectorised
+                    dx = blocks[leaf, 0, k, i] - frame[0, 0]
+                    dy, dz = blocks[leaf, 1, k, i] - frame[0, 1], blocks[leaf, 2, k, i] - frame[0, 2]
+                    corners[axis, k, i] = x * dx + y * dy + z * dz
 
 
 @compiled(error_model="numpy", inline="always")
@@ -55,7 +74,7 @@ def depth_plane(a, b, c, volume):
 
 
 @compiled(error_model="numpy", uses=(colour_kernels, culling_kernels))
-def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
+def _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup):
     """Draw `count` spans of rows, see `_draw`."""
     lows, highs, bases, slopes, first_rows, last_rows = spans[0], spans[1], spans[2], spans[3], spans[4], spans[5]
     pad, height = 1e-6 + ATAN_ERROR * view.rows_per_rad, view.height
@@ -76,7 +95,7 @@ def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
         if lookup is not None:  # noqa: SIM102 (numba leaves the inner part out where lookup is None)
             if holes[np.uintp(label)]:
                 k = np.int64(index[np.uintp(label)])
-                weights = weights_along(corners, label, view, directions[0, j], directions[1, j])
+                weights = weights_along(corners, label, view, frame, directions[0, j], directions[1, j])
                 for row in range(first, last + 1):
                     r = np.uintp(row)
                     t, key = tangents[r], key_of(base + slope * tangents[r], label)
@@ -91,17 +110,17 @@ def _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup):
 
 
 @compiled(error_model="numpy", uses=(colour_kernels, culling_kernels))
-def _draw(triangles, directions, tangents, view, keys, lookup):
+def _draw(triangles, directions, tangents, view, frame, keys, lookup):
     """Draw all triangles. Boxes are visited from near to far, so that near ones hide far ones.
 
-    directions: (2, width) cosines and sines of the azimuths of the columns in the world. Spans are collected and drawn together; each has
+    directions: (2, width) cosines and sines of the azimuths of the columns. Spans are collected and drawn together; each has
     a column and a label (pairs), least and greatest tangent, base and slope of the inverse distance, and two rows to work in (spans).
     """
     blocks, labels, boxes, cull = triangles
     width, start, stop, leaves = view.width, view.start, view.stop, boxes.shape[1] // 2
     work, found = np.empty(9 * LEAF, np.float32), np.empty(LEAF, np.int64)
     pairs, spans = np.empty((2, _SPANS), np.int64), np.empty((6, _SPANS))
-    parts, stack = np.empty(8 * FAN, np.float32), np.empty((MAX_STACK, 6))
+    parts, stack, corners = np.empty(8 * FAN, np.float32), np.empty((MAX_STACK, 6)), np.empty((3, 3, LEAF))
     stack[0], size = (1, 0, width - 1, 0, view.height - 1, 0), 1  # the box of all
     while size:
         size -= 1
@@ -109,16 +128,17 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
             continue
         box = np.int64(stack[size, 0])
         if box < leaves:
-            size = push_parts(boxes, box, view, parts, stack, size)
+            size = push_parts(boxes, box, view, frame, parts, stack, size)
             continue
         begin = (box - leaves) * LEAF
-        end, corners = min(begin + LEAF, len(labels)), blocks[box - leaves]
+        end = min(begin + LEAF, len(labels))
+        find_corners(blocks, box - leaves, view, frame, corners)
         candidates = find_candidates(corners, end - begin, view, work, found)
         count = np.int64(0)  # not a literal, for which numba would compile another `_draw_spans`
         for k in range(candidates):
             i = found[k]
             first, last = np.int64(work[6 * LEAF + i]), np.int64(work[7 * LEAF + i])
-            a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
+            a, b, c = corner(corners, 0, i), corner(corners, 1, i), corner(corners, 2, i)
             nx, ny, nz = cross(b, c)
             volume = a[0] * nx + a[1] * ny + a[2] * nz
             if abs(volume) < 1e-200 or (cull and volume > 0.0):  # seen from its edge, or from its back
@@ -135,9 +155,9 @@ def _draw(triangles, directions, tangents, view, keys, lookup):
                 spans[0, count], spans[1, count], spans[2, count], spans[3, count] = low, high, gx * cos + gy * sin, gz
                 count += (low <= high) & (wrapped >= start) & (wrapped < stop)
                 if count == _SPANS:
-                    _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
+                    _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup)
                     count = 0
-        _draw_spans(count, pairs, spans, directions, tangents, view, keys, lookup)
+        _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup)
 
 
 @compiled
@@ -148,29 +168,41 @@ def find_directions(azimuths, heading, directions):
 
 
 @compiled(uses=(colour_kernels, culling_kernels))
-def draw_views(triangles, rays, paint, lookup, poses, start, stop, keys, views):
+def _draw_view(triangles, rays, paint, lookup, view, frame, directions, keys, pixels):
+    """Draw one view, see `draw_views`. frame: that of a tilted eye, or None."""
+    azimuths, tangents, _, _, n = rays
+    colours, weights = paint
+    find_directions(azimuths, view.heading, directions)
+    keys[view.start : view.stop] = 0
+    _draw(triangles, directions, tangents, view, frame, keys, lookup)
+    if lookup is None:
+        average(keys, n, colours, weights, view.start // n, view.stop // n, pixels)
+    else:
+        colour_rays(lookup, colours, directions, tangents, view, frame, keys)
+        average(keys, n, None, weights, view.start // n, view.stop // n, pixels)
+
+
+@compiled(uses=(colour_kernels, culling_kernels))
+def draw_views(triangles, rays, paint, lookup, poses, frames, start, stop, keys, views):
     """Draw columns start..stop-1 of views.
 
     Args:
         triangles, rays, paint: `Triangles`, `Rays` and `Paint` as plain tuples, which numba accepts faster.
         lookup: `Lookup` likewise; None in a plain world.
-        poses: (n, 4) x (m), y (m), heading (rad) and height (m) of the eye.
+        poses: (n, 6) x (m), y (m), heading (rad), height (m), pitch and roll (rad) of the eye.
+        frames: (n, 4, 3) of tilted eyes: position (m), and the directions ahead, left and up. None for level ones.
         start, stop: Columns of pixels.
         keys: (width, height) of rays, int64, to work in: the `key_of` of the nearest triangle so far, 0 for the sky.
         views: (n, height, width) of pixels, which become red, green, blue and alpha in 8 bits each, red lowest.
     """
-    azimuths, tangents, top, rows_per_rad, n = rays
-    colours, weights = paint
+    _, _, top, rows_per_rad, n = rays
     width, height = keys.shape
     directions = np.empty((2, width))
     for i in range(len(poses)):
-        x, y, heading, z = poses[i]
-        find_directions(azimuths, heading, directions)
-        view = View(x, y, z, heading, top, rows_per_rad, width, height, start * n, stop * n)
-        keys[start * n : stop * n] = 0
-        _draw(triangles, directions, tangents, view, keys, lookup)
-        if lookup is None:
-            average(keys, n, colours, weights, start, stop, views[i])
-        else:
-            colour_rays(lookup, colours, directions, tangents, view, keys)
-            average(keys, n, None, weights, start, stop, views[i])
+        if frames is None:
+            x, y, heading, z = poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3]
+            view = View(x, y, z, heading, top, rows_per_rad, width, height, start * n, stop * n)
+            _draw_view(triangles, rays, paint, lookup, view, None, directions, keys, views[i])
+        else:  # what is seen is turned into the frame of the eye
+            view = View(0.0, 0.0, 0.0, 0.0, top, rows_per_rad, width, height, start * n, stop * n)
+            _draw_view(triangles, rays, paint, lookup, view, frames[i], directions, keys, views[i])

@@ -85,6 +85,15 @@ def random_poses(n: int, seed: int = 1) -> np.ndarray:
     return np.column_stack([rng.uniform(-2, 2, (n, 2)), rng.uniform(-np.pi, np.pi, n)])
 
 
+def full_poses(field: Bounds, n: int, seed: int = 1, tilt_deg: float = 40.0) -> np.ndarray:
+    """Full poses (n, 6) over a field, 1 cm to 1 m high, pitched and rolled to any angle up to a limit."""
+    rng = np.random.default_rng(seed)
+    x0, y0, x1, y1 = field
+    xy = np.column_stack([rng.uniform(x0, x1, n), rng.uniform(y0, y1, n)])
+    tilt = np.radians(rng.uniform(-tilt_deg, tilt_deg, (n, 2)))
+    return np.column_stack([xy, rng.uniform(-np.pi, np.pi, n), rng.uniform(0.01, 1, n), tilt])
+
+
 def views(n: int, seed: int = 0, h: int = 5, w: int = 24) -> torch.Tensor:
     """White noise. Drawn by numpy: torch's generator with the seed of a model would draw views that are the weights it begins with."""
     return torch.tensor(np.random.default_rng(seed).normal(size=(n, h, w)), dtype=torch.float32)

@@ -11,7 +11,7 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import random_poses, random_world, world_of
+from scenes import full_poses, random_poses, random_world, world_of
 
 from tussock.navigation import failures
 from tussock.navigation.agent import Agent
@@ -544,6 +544,9 @@ def test_the_share_covered_is_what_a_renderer_draws(seed, double_sided):
         for x, y, _ in random_poses(4, seed):
             drawn = renderer.render([(x, y, 0.0)])[0, ..., 3] > 127
             assert covered_within(world, eye, [Pose(x, y, 0.0)], within) == drawn.mean()
+        for pose in full_poses(world.field, 4):
+            drawn = renderer.render(pose[None])[0, ..., 3] > 127
+            assert covered_within(world, eye, pose[None], within) == drawn.mean()
 
 
 @pytest.mark.parametrize("double_sided", [True, False])

@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scenes import hills, mesh_world, post, random_poses, random_texture, textured_world
+from scenes import full_poses, hills, mesh_world, post, random_poses, random_texture, textured_world
 
 from tussock.render import Eye, Renderer, gl, open_renderer
 from tussock.render.cubemap import Cubemap, face_size_for
@@ -191,6 +191,13 @@ def test_an_eye_stands_on_the_mesh(backend):
     poses = [Pose(2.0, 2.2, 1.0), Pose(5.0, 4.1, -2.0)]
     with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
         assert_agree(ours.render(poses), cpu.render(poses))
+
+
+def test_agrees_for_pitched_and_rolled_eyes_on_terrain(backend):
+    world = mesh_world(hills(), *(post(x, x / 2, 0.2) for x in np.arange(0.5, 6, 0.5))).on_mesh()
+    poses = full_poses(world.field, 4)
+    with open_renderer(world, backend=backend) as ours, open_renderer(world, backend="cpu") as cpu:
+        assert_agree(ours.render(poses), cpu.render(poses), share=0.02)
 
 
 def test_an_empty_world_is_all_sky(backend):

@@ -87,7 +87,8 @@ def test_each_part_of_a_command_has_its_lines_in_a_pipe(clock, capsys):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "words"), [(0, "0 s"), (89, "89 s"), (90, "2 min"), (5399, "90 min"), (5400, "1.5 h"), (90_000, "25.0 h")]
+    ("seconds", "words"),
+    [(0, "0 s"), (89, "89 s"), (90, "2 min"), (5399, "90 min"), (5400, "1.5 h"), (90_000, "25.0 h")],
 )
 def test_a_duration_is_said_shortly(seconds, words):
     assert in_words(seconds) == words

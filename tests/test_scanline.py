@@ -8,11 +8,23 @@ import numpy as np
 import pytest
 import trimesh
 from renderer_laws import batches_and_threads_do_not_matter, low_resolution_is_the_mean_over_each_pixels_solid_angle
-from scenes import random_poses, random_world, world_of
+from scenes import (
+    full_poses,
+    hills,
+    mesh_world,
+    post,
+    random_poses,
+    random_texture,
+    random_world,
+    textured_world,
+    world_of,
+)
+from scipy.spatial.transform import Rotation
 
 from tussock.render import culling_kernels
 from tussock.render.culling_kernels import View, find_candidates
 from tussock.render.eye import Eye
+from tussock.render.poses import poses_of_eye
 from tussock.render.renderer import open_renderer
 from tussock.render.scanline import ScanlineRenderer
 from tussock.render.triangle_tree import TriangleTree
@@ -26,12 +38,15 @@ def embree(world: World, eye: Eye, pose) -> np.ndarray:
     """A view (height, width, 4) by casting the eye's rays with Embree; one ray a pixel."""
     triangles, rgb = world.surfaces()
     mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
-    azimuth, elevation = pose[2] + column_azimuths(eye.width), eye.elevations()[:, None]
+    x, y, heading, z, pitch, roll = poses_of_eye(world, eye, [pose])[0]
+    azimuth, elevation = column_azimuths(eye.width), eye.elevations()[:, None]
     towards = np.broadcast_arrays(
         np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)
     )
-    towards = np.stack(towards, axis=-1).reshape(-1, 3)
-    hit = mesh.ray.intersects_first(np.broadcast_to([pose[0], pose[1], eye.z], towards.shape), towards)
+    # Turned about the axes of the world, in the opposite order: roll about x, pitch about y, heading about z.
+    turns = Rotation.from_euler("xyz", [roll, -pitch, heading])
+    towards = turns.apply(np.stack(towards, axis=-1).reshape(-1, 3))
+    hit = mesh.ray.intersects_first(np.broadcast_to([x, y, z], towards.shape), towards)
     hit = hit.reshape(eye.height, eye.width)
     view = np.concatenate([rgb, np.full((len(rgb), 1), 255, np.uint8)], axis=1)[hit]
     view[hit < 0] = [*world.sky_rgb, 0]
@@ -69,6 +84,60 @@ def test_equals_embree_among_triangles_above_below_and_around_the_eye(span):
     with open_renderer(world, eye, "cpu") as renderer:
         for pose in random_poses(5):
             assert share_different(renderer.render([pose])[0], embree(world, eye, pose)) < 0.001
+
+
+@pytest.mark.parametrize("name", ["tussock-field", "woodland", "random", "hills"])
+def test_pitched_and_rolled_eyes_equal_embree(name):
+    if name == "hills":
+        world = mesh_world(hills(), *(post(x, x / 2, 0.2) for x in np.arange(0.5, 6, 0.5))).on_mesh()
+    else:
+        world = random_world(seed=5, n=400) if name == "random" else World.generate(name, seed=3)
+    with open_renderer(world, Eye(width=360, height=120, top=1.2, bottom=-0.9), "cpu") as renderer:
+        poses = full_poses(world.field, 8)
+        for pose, view in zip(poses, renderer.render(poses), strict=True):
+            assert share_different(view, embree(world, renderer.eye, pose)) < 0.001
+
+
+def test_a_level_eye_has_the_same_bytes_among_tilted_ones():
+    world = random_world()
+    poses = full_poses(world.field, 9)
+    poses[::3, 4:] = 0
+    with open_renderer(world, Eye(width=120, height=40, samples=1), "cpu") as renderer:
+        views = renderer.render(poses)
+        assert all(
+            np.array_equal(view, renderer.render(pose[None])[0]) for view, pose in zip(views, poses, strict=True)
+        )
+        planar = renderer.render(random_poses(4))
+        level = np.column_stack([random_poses(4), np.full(4, renderer.eye.z), np.zeros((4, 2))])
+        assert np.array_equal(renderer.render(level), planar)
+
+
+def test_an_eye_rolled_on_its_side_sees_up_at_its_left(renderer):
+    """A quarter turn of roll takes the right side down: what was above is at the left, what was below at the right."""
+    world = world_of([[(-9, -9, 2), (9, -9, 2), (0, 30, 2)]], [[9, 9, 9]], ground=False)
+    eye = Eye(width=90, height=20, top=0.3, bottom=-0.3)
+    with open_renderer(world, eye, "cpu") as opened:
+        view = opened.render([(0.0, 0.0, 0.7, 0.5, 0.0, np.pi / 2)])[0, ..., 3]
+        assert (view[:, 20:25] == 255).all()  # 90 degrees to the left
+        assert not view[:, 45:].any()
+        view = opened.render([(0.0, 0.0, 0.7, 0.5, np.pi / 2, 0.0)])[0, ..., 3]  # its nose up
+        assert (view[:, 43:47] == 255).all()
+
+
+def test_pitched_views_of_a_textured_world_turn_with_the_world():
+    """To tilt the eye is to tilt the world the other way, textures and holes included."""
+    world = textured_world([random_texture(1), random_texture(2, alpha="mask")], ground=False)
+    eye = Eye(width=120, height=40, top=1.0, bottom=-1.0, samples=1)
+    for pose in full_poses(world.field, 4):
+        turned = (
+            Rotation.from_euler("xyz", [pose[5], -pose[4], pose[2]])
+            .inv()
+            .apply(world.triangles.reshape(-1, 3) - pose[[0, 1, 3]])
+        )
+        other = dataclasses.replace(world, triangles=turned.reshape(-1, 3, 3).astype(np.float32))
+        with open_renderer(world, eye, "cpu") as ours, open_renderer(other, eye, "cpu") as theirs:
+            still = theirs.render([(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)])[0]
+            assert share_different(ours.render([pose])[0], still) < 0.002
 
 
 def test_agrees_with_images_of_another_program(sussex):
@@ -235,7 +304,8 @@ def test_no_triangle_that_a_ray_meets_is_left_out(size, scale):
         corners = (rng.uniform(-2, 2, (n, 1, 3)) + scale * rng.normal(size=(n, 3, 3))) * [1, 1, 0.5]
         corners = np.float32(np.round(4 * corners) / 4 if k % 3 == 0 else corners)
         view = View(0.25, -0.5, 0.0, rng.uniform(-20, 20), 1.0, height / 1.5, width, height, 0, width)
-        count = find_candidates(np.ascontiguousarray(corners.transpose(2, 1, 0)), n, view, work, found)
+        seen_from_eye = corners.transpose(2, 1, 0) - np.array([view.x, view.y, view.z])[:, None, None]
+        count = find_candidates(np.ascontiguousarray(seen_from_eye), n, view, work, found)
         azimuths = view.heading + column_azimuths(width)
         tangents = np.tan(view.top - (np.arange(height) + 0.5) / view.rows_per_rad)
         a, b, c = (corners.astype(float) - [view.x, view.y, view.z]).transpose(1, 0, 2)

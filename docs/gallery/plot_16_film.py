@@ -2,9 +2,9 @@
 A film of a walk
 ================
 
-A recorded walk becomes a film: the map with the path, what the agent sees, and the heading that it turns to. Write ``walk.mp4`` in place of
-``walk.gif`` for a smaller file (it needs the package imageio-ffmpeg). In a terminal: ``tussock play RUN --video walk.mp4``. Three moments of
-the film are shown here.
+A recorded walk becomes a film: the map with the path, what the agent sees, and the heading that it turns to. Name it ``walk.mp4``
+instead for a smaller file (it needs the package imageio-ffmpeg). In a terminal: ``tussock play RUN --video walk.mp4``. Three moments
+of the film are shown here.
 """
 
 from pathlib import Path
