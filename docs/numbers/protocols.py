@@ -82,7 +82,7 @@ def measure_thesis(folder: Path) -> Values:
     }
 
 
-AZEVEDO_WORLDS = 30  # of 75
+AZEVEDO_WORLDS = 75  # all of the paper
 SUSSEX_WORLD = "--world S/world5000_gray.bin --route S"
 FULL_SIZE: dict[str, tuple[str, Sequence[str], Texts]] = {  # arguments, tables that are kept, texts
     "ardin2016": ("ardin2016", ["by_displacement"], {"errors": errors_by_start}),
