@@ -77,8 +77,17 @@ def test_no_command_shows_them_all_and_a_wrong_one_is_one_line(capfd):
     assert err == "tussock: unknown command 'wrold' (did you mean 'world'?); tussock --help lists all\n"
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
-def test_help_loads_nothing_heavy(arguments):
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        ["run", "--help"],
+        ["run", "--model", "opponent-perfect-memori"],
+        ["evaluate", "--model", "infomx width=3"],
+        ["run", "--navigator", "laterl(k=1)"],
+    ],
+)
+def test_help_and_wrong_names_load_nothing_heavy(arguments):
     script = (
         "import sys; from tussock.navigation.cli.main import main\n"
         "try: main(sys.argv[1:])\n"

@@ -1,6 +1,7 @@
 """The Python of the documentation runs as it is printed. README.md and docs/benchmark.md have tests of their own."""
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -31,6 +32,13 @@ def test_a_recipe_is_short_and_says_what_it_shows(recipe):
     imports = sum(isinstance(each, ast.Import | ast.ImportFrom) for each in code)
     statements = [each for each in ast.walk(ast.Module(code, [])) if isinstance(each, ast.stmt)]
     assert len(statements) - imports <= 20
+
+
+def test_the_walk_that_is_to_fail_in_the_first_hour_does():
+    recorded = json.loads((DOCS / "numbers" / "records" / "lost.json").read_text())
+    command = recorded["origin"]["command"].strip("`")
+    assert f"    {command} --out lost\n" in (DOCS / "first-hour.md").read_text()
+    assert recorded["values"]["reason"] == "lost"
 
 
 def test_the_papers_of_all_models_and_protocols_are_listed():

@@ -80,6 +80,11 @@ class Registry:
             f"unknown {self.kind} {name!r}{suggestion(name, self.names)}; known: {', '.join(self.names)}, {hint}"
         )
 
+    def check(self, name: str) -> None:
+        """Refuse a name that is neither known nor a location, without importing anything. Raises SettingError."""
+        if name not in self and not LOCATION.fullmatch(name):
+            self.find(name)
+
     def where(self, name: str) -> str | None:
         """The `module:attribute` that a name stands for, without importing it; None for what a script registered."""
         if name in self.builtin:

@@ -18,6 +18,7 @@ from tussock.world.registry import suggestion
 
 from ..setting_names import message_of
 from .interruption import end_on_signals
+from .name_check import check_names
 from .overview import COMMANDS, overview
 from .terminal import library_messages, message, show
 
@@ -43,6 +44,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     end_on_signals()
     try:
+        check_names(vars(command))
         if command.json:
             with library_messages(), standard_output_as_error():
                 result = command.run()

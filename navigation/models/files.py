@@ -22,8 +22,8 @@ from ..devices import check_device, chosen_device
 from ..encoding import OLD_NAMES, STEPS, Encoding
 from ..feature_mask import FeatureMask
 from .base import FamiliarityModel, Model
-from .opponents import OPPONENT, Opponent
-from .registry import MODELS
+from .opponents import Opponent
+from .registry import MODELS, OPPONENT
 from .specs import find_model, make_model, present_names
 
 HEADER, VERSION = "tussock", 1

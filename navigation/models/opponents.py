@@ -11,8 +11,7 @@ import torch
 from ..feature_mask import FeatureMask, seeing
 from .base import FamiliarityModel, Images, Learned, Model, Scans, Scores, Shapes, memory_bytes, recognises, score
 from .incremental import IncrementalModel
-
-OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
+from .registry import OPPONENT
 
 T = TypeVar("T")
 Memories = TypeVar("Memories", bound="Opponent")

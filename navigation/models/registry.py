@@ -2,6 +2,8 @@
 
 from tussock.world.registry import Registry
 
+OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
+
 MODELS = Registry(
     "models",
     "model",

@@ -7,8 +7,8 @@ from tussock.world.errors import SettingError
 from tussock.world.specs import Spec
 
 from .base import FamiliarityModel
-from .opponents import OPPONENT, opponents_of
-from .registry import MODELS
+from .opponents import opponents_of
+from .registry import MODELS, OPPONENT
 
 
 def make_model(text: str, **parameters: Any) -> Any:
