@@ -42,6 +42,7 @@ ROUTE_SETTINGS = (
 )  # decide world and route
 VIEW_SETTINGS = (  # decide with these the views that are learned
     "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "mask", "threads",
+    "gaze", "body_length_m", "pitch_noise_deg", "roll_noise_deg",
     "encoding", "resize", "blur", "spacing_m", "every", "learning_walk_m", "parallel_views",
     "goal_walk_m", "goal_turns", "goal_views", "goal_spread_deg", "goal_only",
 )  # fmt: skip

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from tussock.render.eye import Eye
+from tussock.render.posture import Posture
 from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
 
@@ -134,6 +135,7 @@ def _surroundings(given: Mapping[str, Any], known: Eye | None) -> dict[str, Any]
     _check_databases(given)
     fields = {name: value for name, value in fields_of(given).items() if name in attrs.fields_dict(Surroundings)}
     fields["reading"] = MeshReading(**fields_of(given, "reading"))
+    fields["posture"] = Posture(**fields_of(given, "posture"))
     checked = Surroundings(**fields)  # refuses databases that are not there, before they are asked for their eye
     return fields | {"eye": _eye(given, known, checked)}
 

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
@@ -219,8 +220,10 @@ class Diagnostics:
     def _covered(self, steps: Sequence[Step]) -> list[float] | list[None]:
         if isinstance(self._renderer, DatabaseViews):
             return [None] * len(steps)
-        world, eye = self._renderer.world, self._renderer.eye
-        return covered_within(world, eye, [step.pose for step in steps], OCCLUDER_DISTANCE).tolist()
+        world, eye, poses = self._renderer.world, self._renderer.eye, np.array([step.pose for step in steps])
+        if isinstance(self._renderer, CarriedEye):
+            poses = self._renderer.full_poses(poses)
+        return covered_within(world, eye, poses, OCCLUDER_DISTANCE).tolist()
 
     def _nearest(self, steps: Sequence[Step]) -> list[float] | list[None]:
         if self._learned is None:

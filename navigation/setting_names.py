@@ -12,6 +12,7 @@ CLASSES = {  # by the fields of `Experiment` that hold them
     "": ("Surroundings", "Experiment"),
     "reading": ("MeshReading",),
     "eye": ("Eye",),
+    "posture": ("Posture",),
     "training": ("TrainingSetup",),
     "body": ("Body",),
     "displacement": ("Displacement",),

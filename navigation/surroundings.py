@@ -10,6 +10,7 @@ import attrs
 
 from tussock.render.backends import BACKENDS
 from tussock.render.eye import Eye
+from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.meshes.reading import MeshReading
@@ -39,6 +40,7 @@ OF_WORLDS = (
     "columns",
     "smooth",
     "renderer",
+    "posture",
 )  # fields that databases do not take
 
 
@@ -102,6 +104,7 @@ class Surroundings:
         grid_database: Folder of an image database of the views around that route, which agents see: the one nearest to them. None:
             they see those of the route.
         eye: What part of the sphere is seen, and how finely. Default: that of the databases, or `Eye()`.
+        posture: How the body holds the eye: level, or as the ground slopes.
         seed: Of everything random: world and route where they are generated, and, in an experiment, the model's start and the noise.
         renderer: "auto", "cpu", "cuda", "egl" or "osmesa".
         threads: To draw with, and, in an experiment, to learn and compare with; None means one for each core.
@@ -122,6 +125,7 @@ class Surroundings:
     route_database: Path | None = attrs.field(default=None, converter=_folder)
     grid_database: Path | None = attrs.field(default=None, converter=_folder)
     eye: Eye = instance_of(Eye, attrs.Factory(_eye, takes_self=True), "an Eye")
+    posture: Posture = instance_of(Posture, attrs.Factory(Posture), "a Posture")
     seed: int = whole(0, low=0)
     renderer: str = choice("auto", BACKENDS)
     threads: int | None = whole(None, high=4096, optional=True)
@@ -148,7 +152,7 @@ class Surroundings:
                 f"{self.grid_database} is a grid without a route; give the image database of a route as well"
             )
         fields = attrs.fields_dict(type(self))
-        usual = {name: fields[name].default for name in OF_WORLDS} | {"reading": MeshReading()}
+        usual = {name: fields[name].default for name in OF_WORLDS} | {"reading": MeshReading(), "posture": Posture()}
         for name in OF_WORLDS:
             if (value := getattr(self, name)) != usual[name]:
                 refuse(self, fields[name], value, "none with image databases, which take the place of a world")
@@ -232,7 +236,12 @@ class Surroundings:
             return open_views(self.route_database, self.grid_database, self.eye, self.headings)
         from tussock.render.renderer import open_renderer
 
-        return open_renderer(world, self.eye, self.renderer, threads=self.threads)
+        renderer = open_renderer(world, self.eye, self.renderer, threads=self.threads)
+        if not self.posture.tilts(world):
+            return renderer
+        from tussock.render.carried import CarriedEye
+
+        return CarriedEye(renderer, self.posture, self.seed)
 
     def open_views_beside(self) -> "Float[np.ndarray, 'k 3']":
         """Poses of the views of the grid database (m, m, rad); none where there is no such database."""

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
+from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
@@ -185,8 +186,8 @@ def _remark_on_learning_walk() -> None:
 
 
 def training_source(renderer: Renderer) -> Renderer:
-    """What draws the views to learn: the renderer, or, of image databases, the views of the route and those beside it."""
-    return renderer.training if isinstance(renderer, DatabaseViews) else renderer
+    """What draws the views to learn: the renderer, or what image databases and carried eyes have for this."""
+    return renderer.training if isinstance(renderer, DatabaseViews | CarriedEye) else renderer
 
 
 def training_views(

@@ -21,7 +21,7 @@ from .walker import Step
 COLUMNS = (
     "step", "x_m", "y_m", "z_m", "heading_deg", "turn_deg", "familiarity", "deviation_m", "along_m", "error_deg",
     "match", "place", "reset", "reason", "covered", "nearest_view_m", "recognised_view_m", "turning_deg", "cause",
-    "view_distance_m", "side", "goal_m", "looks", "touched", "displaced",
+    "view_distance_m", "side", "goal_m", "looks", "touched", "displaced", "pitch_deg", "roll_deg",
 )  # fmt: skip
 OFF_ROUTE = 0.05  # m; an agent farther from the route is off it
 PARALLEL = np.sin(
@@ -49,6 +49,7 @@ class Trajectory:
         row = (step.index, *step.pose[:2], step.height, heading, turn, scanned, step.deviation, step.along, error)
         row += (step.match, step.progress, step.reset, step.reason, *_measured(diagnosis), step.view_distance)
         row += (step.side, step.goal_distance, step.looks, step.touched or None, step.displaced or None)
+        row += tuple(float(np.degrees(angle)) or None for angle in step.tilt)
         self.rows.append(tuple(map(_plain, row)))
         self.signals.append({name: float(value) for name, value in step.signals.items() if np.ndim(value) == 0})
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
+from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.collisions import slid, stopped
@@ -109,6 +110,10 @@ class Walk:
         """What the agents whose walk goes on perceive."""
         walking = self.walking
         poses = np.array([agent.pose for agent in walking])
+        if isinstance(self.renderer, CarriedEye):
+            poses = self.renderer.full_poses(poses)
+            for agent, (pitch, roll) in zip(walking, poses[:, 4:].tolist(), strict=True):
+                agent.tilt = pitch, roll
         views = self.renderer.render(poses)
         known = self.renderer.known(poses) if isinstance(self.renderer, DatabaseViews) else None
         self._seen = views, self.encoding(views, known)

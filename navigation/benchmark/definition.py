@@ -46,6 +46,7 @@ LATER = {
     *ROUTE_SETTINGS, "field_deg", "mask", "parallel_views", "put_back_ahead_m", "goal_walk_m", "goal_turns", "goal_views",
     "goal_spread_deg", "goal_only",
     "collisions", "body_radius_m", "senses", "release_m", "release_deg", "displace_at", "displace_m",
+    "gaze", "body_length_m", "pitch_noise_deg", "roll_noise_deg",
 } - EARLY  # fmt: skip
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
 

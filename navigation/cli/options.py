@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import attrs
 import tyro
 
+from tussock.render.posture import Posture
 from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
 
@@ -120,6 +121,14 @@ class ViewOptions(MeshOptions):
     """A picture of what the eye sees of the panorama: white where it sees, black where it does not. Default: all, or the model file's."""
     cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
+    gaze: Annotated[str, tyro.conf.arg(metavar="level|body")] = default(Posture, "gaze")
+    """level: the head keeps the eye level. body: the eye pitches and rolls with the ground beneath the body (--ground mesh)."""
+    body_length_m: float = default(Posture, "body_length")
+    """Length over which the ground's slope tilts the body, for --gaze body."""
+    pitch_noise_deg: float = degrees(default(Posture, "pitch_noise"))
+    """Standard deviation of noise on the pitch of the eye, drawn anew at each place."""
+    roll_noise_deg: float = degrees(default(Posture, "roll_noise"))
+    """Standard deviation of noise on its roll."""
 
     def settings(self) -> dict[str, Any]:
         """The settings of a run that these flags give."""

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -12,6 +12,11 @@ from tussock.world.errors import FileError, SettingError
 from ..surroundings import Surroundings
 from .options import WORLD, Command, MeshOptions, ViewOptions
 from .terminal import message
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from tussock.render.renderer import Renderer
 
 
 @dataclass
@@ -58,6 +63,10 @@ class ViewCommand(ViewOptions):
     """Where the eye is (m) and faces (degrees counter-clockwise from +x, east). Default: the middle of the world, facing north."""
     out: Path = Path("view.png")
     """PNG to write: ahead in the middle, behind at both edges."""
+    pitch_deg: float | None = None
+    """Elevation of the direction ahead of the eye. Default: that of the body, as --gaze and --pitch-noise-deg say."""
+    roll_deg: float | None = None
+    """Turn of the eye about the direction ahead; positive: its right side down. Default: likewise."""
     alpha: bool = False
     """Write RGBA: alpha is the share of each pixel that is not open sky."""
 
@@ -74,7 +83,7 @@ class ViewCommand(ViewOptions):
         world = surroundings.open_world()
         x, y, heading_deg = self.position(world)
         with surroundings.open_renderer(world) as renderer:
-            view = renderer.render([(x, y, math.radians(heading_deg))])[0]
+            view = renderer.render(self._tilted(renderer, np.array([[x, y, math.radians(heading_deg)]])))[0]
             backend = renderer.backend
         message(f"renderer: {backend}")
         if surroundings.eye.masked:
@@ -87,6 +96,22 @@ class ViewCommand(ViewOptions):
                 cv2.imencode(".png", image if self.alpha else np.ascontiguousarray(image[..., :3]))[1].tobytes()
             )
         return {"view": str(self.out), "width": view.shape[1], "height": view.shape[0], "renderer": backend}
+
+    def _tilted(self, renderer: "Renderer", poses: "np.ndarray") -> "np.ndarray":
+        """Poses with the pitch and the roll that are asked for."""
+        from tussock.render.carried import CarriedEye
+        from tussock.render.poses import poses_of_eye
+
+        tilt = [None if angle is None else math.radians(angle) for angle in (self.pitch_deg, self.roll_deg)]
+        if tilt == [None, None]:
+            return poses
+        if not all(angle is None or abs(angle) <= math.pi for angle in tilt):  # nan as well
+            raise SettingError("--pitch-deg and --roll-deg are from -180 to 180")
+        carried = isinstance(renderer, CarriedEye)
+        full = renderer.full_poses(poses) if carried else poses_of_eye(renderer.world, renderer.eye, poses)
+        for column, angle in enumerate(tilt, start=4):
+            full[:, column] = full[:, column] if angle is None else angle
+        return full
 
     def position(self, world) -> tuple[float, float, float]:
         """x, y (m) and heading (degrees) to look from."""
