@@ -52,11 +52,13 @@ from .navigation import training_poses as training_poses
 from .navigation import translational as translational
 from .navigation import write_sweep_report as write_sweep_report
 from .render import Eye as Eye
+from .render import Posture as Posture
 from .render import Renderer as Renderer
 from .render import open_renderer as open_renderer
 from .world import Bounds as Bounds
 from .world import DiskFullError as DiskFullError
 from .world import FileError as FileError
+from .world import FullPose as FullPose
 from .world import Ground as Ground
 from .world import InputError as InputError
 from .world import MeshReading as MeshReading

@@ -99,6 +99,14 @@ def test_help_and_wrong_names_load_nothing_heavy(arguments):
     assert not loaded & HEAVY
 
 
+def test_what_reads_the_output_may_have_enough_of_it():
+    done = subprocess.run(
+        f"{sys.executable} -c 'from tussock.navigation.cli.main import main; main()' models --json | head -c 1",
+        shell=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("{", "")
+
+
 # What the commands make
 
 

@@ -6,6 +6,7 @@ from .errors import SettingError as SettingError
 from .files import open_world as open_world
 from .files import read_world as read_world
 from .files import write_world as write_world
+from .full_pose import FullPose as FullPose
 from .geometry import Bounds as Bounds
 from .geometry import Pose as Pose
 from .geometry import Route as Route

@@ -61,6 +61,8 @@ def main(arguments: list[str] | None = None) -> None:
         if error.name != "torch":
             raise
         fail("this command needs torch, which is not installed; install it: pip install torch")
+    except BrokenPipeError:  # what reads the output has enough of it, as head does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except RuntimeError as error:

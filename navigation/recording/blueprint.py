@@ -28,6 +28,7 @@ def cause_entity(cause: Cause) -> str:
     return f"world/causes/{cause.replace(' ', '_')}"
 
 
+TILT = "tilt/degrees"
 MARKS = {cause_entity(cause): colour for cause, colour in CAUSE_COLOURS.items()} | {
     TOUCHED: (255, 140, 0), CARRIED: (255, 255, 255),
 }  # fmt: skip
@@ -40,6 +41,7 @@ class Shown:
     Attributes:
         recognised: Learned views that are recognised.
         scan: Familiarity of all rotations.
+        tilt: Pitch and roll of the eye.
         lines: Names of the signals that are numbers.
         maps: Names of the signals that are several values.
         ways: Names of the signals that are ways.
@@ -47,6 +49,7 @@ class Shown:
 
     recognised: bool = False
     scan: bool = False
+    tilt: bool = False
     lines: tuple[str, ...] = ()
     maps: tuple[str, ...] = ()
     ways: tuple[str, ...] = ()
@@ -58,6 +61,7 @@ class Shown:
             self,
             recognised=self.recognised or (step.match is not None and learned),
             scan=self.scan or step.familiarity is not None,
+            tilt=self.tilt or any(step.tilt),
             **{kind: tuple(dict.fromkeys([*getattr(self, kind), *found])) for kind, found in names.items()},
         )
 
@@ -102,6 +106,10 @@ def _agent_views(max_deviation: float, shown: Shown) -> rrb.Vertical:
         views.append((1.3, rrb.Horizontal(*maps)))
     views.append((1, _curve("deviation", "Deviation from the route (m)", (0.0, max_deviation))))
     views.append((1, _curve("error", "Heading error (degrees; grey: 45 to either side)", (-90.0, 90.0))))
+    if shown.tilt:
+        limits, legend = rrb.ScalarAxis(range=(-45.0, 45.0)), rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)
+        name = "Tilt of the eye (degrees): front up, right side down"
+        views.append((1, rrb.TimeSeriesView(origin=TILT, name=name, axis_y=limits, plot_legend=legend)))
     if not shown.scan:
         views.append((1, _curve("goal", "Distance from the goal (m)", None)))
     shares, panels = zip(*views, strict=True)

@@ -16,6 +16,7 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
+from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.world.geometry import Route
@@ -26,7 +27,7 @@ from ..stopping import StopReason
 from ..training import training_source
 from ..walker import Step
 from . import disk
-from .blueprint import MARKS, OF_A_SCAN, Shown, blueprint, image_format
+from .blueprint import MARKS, OF_A_SCAN, TILT, Shown, blueprint, image_format
 from .columns import image_columns
 from .marks import Marks, ends_of_scale, events_of, scale
 from .scans import ScanLog
@@ -199,6 +200,8 @@ class Recording:
         names = {"deviation/m": "deviation from the route (m)", "error/degrees": "heading error (degrees)"}
         for (entity, name), colour in zip(names.items(), (PATH_COLOUR, MATCH_COLOUR), strict=True):
             self._log(entity, rr.SeriesLines(names=name, colors=colour), static=True)
+        if isinstance(self._renderer, CarriedEye):
+            self._log(TILT, rr.SeriesLines(colors=[PATH_COLOUR, ROUTE_COLOUR], names=["pitch", "roll"]), static=True)
         self._log(GUIDES, rr.SeriesLines(colors=[GUIDE_COLOUR] * 2, names=["45 left", "45 right"]), static=True)
         for entity, colour in MARKS.items():
             self._log(entity, rr.Points3D.from_fields(colors=colour, radii=0.03), static=True)
@@ -233,6 +236,9 @@ class Recording:
         self._send("error/degrees", steps, rr.Scalars.columns(scalars=np.degrees([step.error for step in steps])))
         guides = np.tile([45.0, -45.0], len(steps))
         self._send(GUIDES, steps, rr.Scalars.columns(scalars=guides).partition([2] * len(steps)))
+        if self._shown.tilt:
+            tilts = np.degrees([step.tilt for step in steps])
+            self._send(TILT, steps, rr.Scalars.columns(scalars=tilts.ravel()).partition([2] * len(steps)))
         self._send("goal/m", steps, rr.Scalars.columns(scalars=[step.goal_distance for step in steps]))
         self._send("looks/headings", steps, rr.Scalars.columns(scalars=[step.looks for step in steps]))
         self._signals.write(steps, {step.index: _place(step) for step in steps})
