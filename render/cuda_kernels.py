@@ -17,7 +17,7 @@ from numba import cuda as numba_cuda
 from .colour_kernels import PLAIN, opaque, ray_colour, weights_along
 from .compile import SIMULATED
 from .culling_kernels import ATAN_ERROR, ERROR_32, LEAF, View, key_of, row_of
-from .scanline_kernels import bound, covered, cross, depth_plane
+from .scanline_kernels import bound, corner, covered, cross, depth_plane
 
 cuda: Any = numba_cuda  # its types are those of Python, not of kernels
 THREADS = 128  # in a block
@@ -46,12 +46,6 @@ def _plus_product(total, weight, value):
 def _view_of(eyes, numbers, v):
     top, rows_per_rad, width, height = numbers
     return View(eyes[v, 0], eyes[v, 1], eyes[v, 3], eyes[v, 2], top, rows_per_rad, width, height, 0, width)
-
-
-@_device
-def corner(corners, k, i, view):
-    """Corner k of triangle i, seen from the eye."""
-    return corners[0, k, i] - view.x, corners[1, k, i] - view.y, corners[2, k, i] - view.z
 
 
 @_device

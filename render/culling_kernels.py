@@ -107,9 +107,9 @@ def _find_corners(corners, n, view, work):
     _, per_rad, middle, _, _ = _in_float32(view)
     for k in range(3):
         for i in range(n):  # without branches, so that it is vectorised
-            dx, dy = np.float32(corners[0, k, i]), np.float32(corners[1, k, i])
+            dx, dy = np.float32(corners[0, k, i] - view.x), np.float32(corners[1, k, i] - view.y)
             work[k * LEAF + i] = middle - _atan2_32(dy, dx) * per_rad
-            work[(3 + k) * LEAF + i] = np.float32(corners[2, k, i]) / (np.sqrt(dx * dx + dy * dy) + _TINY)
+            work[(3 + k) * LEAF + i] = np.float32(corners[2, k, i] - view.z) / (np.sqrt(dx * dx + dy * dy) + _TINY)
 
 
 @compiled(error_model="numpy")
@@ -121,7 +121,7 @@ def find_candidates(corners, n, view, work, found):
     between the least and the greatest t at which edges cross it. For others the least and the greatest t of the corners must do.
 
     Args:
-        corners: (3, 3, LEAF) of the triangles of a leaf, as seen from the eye (m).
+        corners: (3, 3, LEAF) see `TriangleTree`; for a tilted eye in its own frame.
         n: Triangles in the leaf.
         work: (9 * LEAF,) of float32. Some of it is to work in. The seventh LEAF numbers become the first column of each triangle
             (0..width-1), the eighth its last one (which may exceed width - 1).

@@ -22,27 +22,24 @@ def cross(a, b):
 
 
 @compiled(inline="always")
-def corner(corners, k, i):
-    """Corner k of triangle i."""
-    return corners[0, k, i], corners[1, k, i], corners[2, k, i]
+def corner(corners, k, i, view):
+    """Corner k of triangle i, seen from the eye."""
+    return corners[0, k, i] - view.x, corners[1, k, i] - view.y, corners[2, k, i] - view.z
 
 
 @compiled
-def find_corners(blocks, leaf, view, frame, corners):
-    """Write the corners of a leaf, as seen from the eye, into corners (3, 3, LEAF); for a tilted eye in its own frame."""
+def _turn_corners(corners, frame, turned):
+    """Write the corners of a leaf in the frame of a tilted eye, which is at its origin, into turned (3, 3, LEAF)."""
     for k in range(3):
-        if frame is None:
-            for i in range(LEAF):
-                corners[0, k, i] = blocks[leaf, 0, k, i] - view.x
-                corners[1, k, i] = blocks[leaf, 1, k, i] - view.y
-                corners[2, k, i] = blocks[leaf, 2, k, i] - view.z
-        else:
-            for axis in range(3):
-                x, y, z = frame[1 + axis]
-                for i in range(LEAF):  # without branches, so that it is vectorised
-                    dx = blocks[leaf, 0, k, i] - frame[0, 0]
-                    dy, dz = blocks[leaf, 1, k, i] - frame[0, 1], blocks[leaf, 2, k, i] - frame[0, 2]
-                    corners[axis, k, i] = x * dx + y * dy + z * dz
+        for axis in range(3):
+            x, y, z = frame[1 + axis]
+            for i in range(LEAF):  # without branches, so that it is vectorised
+                dx, dy, dz = (
+                    corners[0, k, i] - frame[0, 0],
+                    corners[1, k, i] - frame[0, 1],
+                    corners[2, k, i] - frame[0, 2],
+                )
+                turned[axis, k, i] = x * dx + y * dy + z * dz
 
 
 @compiled(error_model="numpy", inline="always")
@@ -110,6 +107,38 @@ def _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lo
 
 
 @compiled(error_model="numpy", uses=(colour_kernels, culling_kernels))
+def _draw_leaf(corners, labels, cull, memory, directions, tangents, view, frame, keys, lookup):
+    """Draw the triangles of a leaf, which have these labels, see `_draw`."""
+    work, found, pairs, spans = memory
+    width, start, stop = view.width, view.start, view.stop
+    candidates = find_candidates(corners, len(labels), view, work, found)
+    count = np.int64(0)  # not a literal, for which numba would compile another `_draw_spans`
+    for k in range(candidates):
+        i = found[k]
+        first, last = np.int64(work[6 * LEAF + i]), np.int64(work[7 * LEAF + i])
+        a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
+        nx, ny, nz = cross(b, c)
+        volume = a[0] * nx + a[1] * ny + a[2] * nz
+        if abs(volume) < 1e-200 or (cull and volume > 0.0):  # seen from its edge, or from its back
+            continue
+        ab, bc, ca = bound(a, b, volume), bound(b, c, volume), bound(c, a, volume)
+        gx, gy, gz = depth_plane(a, b, c, volume)
+        if last < width:
+            first, last = max(first, start), min(last, stop - 1)
+        for column in range(first, last + 1):
+            wrapped = column - width if column >= width else column
+            cos, sin = directions[0, np.uintp(wrapped)], directions[1, np.uintp(wrapped)]
+            low, high = covered(ab, bc, ca, cos, sin)
+            pairs[0, count], pairs[1, count] = wrapped, labels[i]
+            spans[0, count], spans[1, count], spans[2, count], spans[3, count] = low, high, gx * cos + gy * sin, gz
+            count += (low <= high) & (wrapped >= start) & (wrapped < stop)
+            if count == _SPANS:
+                _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup)
+                count = 0
+    _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup)
+
+
+@compiled(error_model="numpy", uses=(colour_kernels, culling_kernels))
 def _draw(triangles, directions, tangents, view, frame, keys, lookup):
     """Draw all triangles. Boxes are visited from near to far, so that near ones hide far ones.
 
@@ -117,11 +146,15 @@ def _draw(triangles, directions, tangents, view, frame, keys, lookup):
     a column and a label (pairs), least and greatest tangent, base and slope of the inverse distance, and two rows to work in (spans).
     """
     blocks, labels, boxes, cull = triangles
-    width, start, stop, leaves = view.width, view.start, view.stop, boxes.shape[1] // 2
-    work, found = np.empty(9 * LEAF, np.float32), np.empty(LEAF, np.int64)
-    pairs, spans = np.empty((2, _SPANS), np.int64), np.empty((6, _SPANS))
-    parts, stack, corners = np.empty(8 * FAN, np.float32), np.empty((MAX_STACK, 6)), np.empty((3, 3, LEAF))
-    stack[0], size = (1, 0, width - 1, 0, view.height - 1, 0), 1  # the box of all
+    leaves = boxes.shape[1] // 2
+    memory = (
+        np.empty(9 * LEAF, np.float32),
+        np.empty(LEAF, np.int64),
+        np.empty((2, _SPANS), np.int64),
+        np.empty((6, _SPANS)),
+    )
+    parts, stack, turned = np.empty(8 * FAN, np.float32), np.empty((MAX_STACK, 6)), np.empty((3, 3, LEAF))
+    stack[0], size = (1, 0, view.width - 1, 0, view.height - 1, 0), 1  # the box of all
     while size:
         size -= 1
         if hidden(stack, size, view, keys):
@@ -130,34 +163,13 @@ def _draw(triangles, directions, tangents, view, frame, keys, lookup):
         if box < leaves:
             size = push_parts(boxes, box, view, frame, parts, stack, size)
             continue
-        begin = (box - leaves) * LEAF
-        end = min(begin + LEAF, len(labels))
-        find_corners(blocks, box - leaves, view, frame, corners)
-        candidates = find_candidates(corners, end - begin, view, work, found)
-        count = np.int64(0)  # not a literal, for which numba would compile another `_draw_spans`
-        for k in range(candidates):
-            i = found[k]
-            first, last = np.int64(work[6 * LEAF + i]), np.int64(work[7 * LEAF + i])
-            a, b, c = corner(corners, 0, i), corner(corners, 1, i), corner(corners, 2, i)
-            nx, ny, nz = cross(b, c)
-            volume = a[0] * nx + a[1] * ny + a[2] * nz
-            if abs(volume) < 1e-200 or (cull and volume > 0.0):  # seen from its edge, or from its back
-                continue
-            ab, bc, ca = bound(a, b, volume), bound(b, c, volume), bound(c, a, volume)
-            gx, gy, gz = depth_plane(a, b, c, volume)
-            if last < width:
-                first, last = max(first, start), min(last, stop - 1)
-            for column in range(first, last + 1):
-                wrapped = column - width if column >= width else column
-                cos, sin = directions[0, np.uintp(wrapped)], directions[1, np.uintp(wrapped)]
-                low, high = covered(ab, bc, ca, cos, sin)
-                pairs[0, count], pairs[1, count] = wrapped, labels[begin + i]
-                spans[0, count], spans[1, count], spans[2, count], spans[3, count] = low, high, gx * cos + gy * sin, gz
-                count += (low <= high) & (wrapped >= start) & (wrapped < stop)
-                if count == _SPANS:
-                    _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup)
-                    count = 0
-        _draw_spans(count, pairs, spans, directions, tangents, view, frame, keys, lookup)
+        leaf = box - leaves
+        of_leaf = labels[leaf * LEAF : (leaf + 1) * LEAF]
+        if frame is None:
+            _draw_leaf(blocks[leaf], of_leaf, cull, memory, directions, tangents, view, frame, keys, lookup)
+        else:
+            _turn_corners(blocks[leaf], frame, turned)
+            _draw_leaf(turned, of_leaf, cull, memory, directions, tangents, view, frame, keys, lookup)
 
 
 @compiled

@@ -304,8 +304,7 @@ def test_no_triangle_that_a_ray_meets_is_left_out(size, scale):
         corners = (rng.uniform(-2, 2, (n, 1, 3)) + scale * rng.normal(size=(n, 3, 3))) * [1, 1, 0.5]
         corners = np.float32(np.round(4 * corners) / 4 if k % 3 == 0 else corners)
         view = View(0.25, -0.5, 0.0, rng.uniform(-20, 20), 1.0, height / 1.5, width, height, 0, width)
-        seen_from_eye = corners.transpose(2, 1, 0) - np.array([view.x, view.y, view.z])[:, None, None]
-        count = find_candidates(np.ascontiguousarray(seen_from_eye), n, view, work, found)
+        count = find_candidates(np.ascontiguousarray(corners.transpose(2, 1, 0)), n, view, work, found)
         azimuths = view.heading + column_azimuths(width)
         tangents = np.tan(view.top - (np.arange(height) + 0.5) / view.rows_per_rad)
         a, b, c = (corners.astype(float) - [view.x, view.y, view.z]).transpose(1, 0, 2)
