@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float, Float32
 
 from tussock.render.renderer import Renderer
+from tussock.render.tilted_eye import check_level
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Route, wrap_angle
 from tussock.world.progress import Progress, no_progress, printed
@@ -170,6 +171,7 @@ def heading_field(
         (n, 3) The positions (m) with these headings (rad).
     """
     progress = printed(progress, "looking around", "positions")
+    check_level(renderer)
     poses, headings = facing_east(positions), np.empty(0)
     for views in encoded_views(encoding, renderer, poses):
         headings = np.concatenate([headings, recovered_headings(model, views, np.zeros(len(views)))])
@@ -199,6 +201,7 @@ def heading_errors(
         progress: Called with how many positions are done, of how many; None prints a line where it takes long, `no_progress` none.
     """
     progress = printed(progress, "recovering headings", "positions")
+    check_level(renderer)
     poses = facing_east(positions)
     views = encoded_views(encoding, renderer, poses)
     about = route.poses[nearest_view(route, poses[:, :2]), 2]

@@ -121,7 +121,8 @@ def _route_key(deciding: dict[str, Any]) -> str:
 
 def _views_key(experiment: Experiment, deciding: dict[str, Any]) -> str:
     learned = "views-" if isinstance(experiment.model, Spec) else "no-views-"
-    return learned + _digest(deciding, (*ROUTE_SETTINGS, *VIEW_SETTINGS))
+    noisy = experiment.posture.pitch_noise or experiment.posture.roll_noise  # as the seed says
+    return learned + _digest(deciding, (*ROUTE_SETTINGS, *VIEW_SETTINGS, *(["seed"] if noisy else [])))
 
 
 def _training_key(deciding: dict[str, Any]) -> str:

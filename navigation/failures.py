@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
@@ -220,9 +219,8 @@ class Diagnostics:
     def _covered(self, steps: Sequence[Step]) -> list[float] | list[None]:
         if isinstance(self._renderer, DatabaseViews):
             return [None] * len(steps)
-        world, eye, poses = self._renderer.world, self._renderer.eye, np.array([step.pose for step in steps])
-        if isinstance(self._renderer, CarriedEye):
-            poses = self._renderer.full_poses(poses)
+        world, eye = self._renderer.world, self._renderer.eye
+        poses = np.array([(*step.pose, step.height + eye.z, *(step.tilt or (0.0, 0.0))) for step in steps])
         return covered_within(world, eye, poses, OCCLUDER_DISTANCE).tolist()
 
     def _nearest(self, steps: Sequence[Step]) -> list[float] | list[None]:

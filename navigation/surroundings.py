@@ -1,8 +1,10 @@
 """Where an experiment takes place: a world or image databases, a route, and the eye that sees them. Light to import."""
 
 import dataclasses
+import logging
 import math
 import os
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from tussock.world.geometry import Route
     from tussock.world.scene import World
 
+log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Surroundings")
 
 GROUNDS = ("flat", "mesh")
@@ -81,6 +84,11 @@ def _eye(surroundings: "Surroundings") -> Eye:
     from tussock.render.images.folders import eye_of
 
     return eye_of(surroundings.route_database, surroundings.grid_database)
+
+
+@cache  # once, however many renderers are opened
+def _remark_on_flat_ground() -> None:
+    log.warning("gaze body changes nothing on flat ground: give --ground mesh for the ground of the world's mesh")
 
 
 @settings
@@ -236,12 +244,14 @@ class Surroundings:
             return open_views(self.route_database, self.grid_database, self.eye, self.headings)
         from tussock.render.renderer import open_renderer
 
+        if self.posture.gaze == "body" and world.terrain is None:
+            _remark_on_flat_ground()
         renderer = open_renderer(world, self.eye, self.renderer, threads=self.threads)
         if not self.posture.tilts(world):
             return renderer
-        from tussock.render.carried import CarriedEye
+        from tussock.render.tilted_eye import TiltedEye
 
-        return CarriedEye(renderer, self.posture, self.seed)
+        return TiltedEye(renderer, self.posture, self.seed)
 
     def open_views_beside(self) -> "Float[np.ndarray, 'k 3']":
         """Poses of the views of the grid database (m, m, rad); none where there is no such database."""

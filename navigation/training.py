@@ -7,9 +7,9 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
+from tussock.render.tilted_eye import TiltedEye
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Route, rounded, wrap_angle
 from tussock.world.progress import Progress, no_progress
@@ -187,7 +187,7 @@ def _remark_on_learning_walk() -> None:
 
 def training_source(renderer: Renderer) -> Renderer:
     """What draws the views to learn: the renderer, or what image databases and carried eyes have for this."""
-    return renderer.training if isinstance(renderer, DatabaseViews | CarriedEye) else renderer
+    return renderer.training if isinstance(renderer, DatabaseViews | TiltedEye) else renderer
 
 
 def training_views(

@@ -49,7 +49,7 @@ class Trajectory:
         row = (step.index, *step.pose[:2], step.height, heading, turn, scanned, step.deviation, step.along, error)
         row += (step.match, step.progress, step.reset, step.reason, *_measured(diagnosis), step.view_distance)
         row += (step.side, step.goal_distance, step.looks, step.touched or None, step.displaced or None)
-        row += tuple(float(np.degrees(angle)) or None for angle in step.tilt)
+        row += (None, None) if step.tilt is None else tuple(np.degrees(step.tilt).tolist())
         self.rows.append(tuple(map(_plain, row)))
         self.signals.append({name: float(value) for name, value in step.signals.items() if np.ndim(value) == 0})
 

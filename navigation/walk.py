@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
+from tussock.render.tilted_eye import TiltedEye
 from tussock.world.collisions import slid, stopped
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Pose, Route
@@ -110,7 +110,7 @@ class Walk:
         """What the agents whose walk goes on perceive."""
         walking = self.walking
         poses = np.array([agent.pose for agent in walking])
-        if isinstance(self.renderer, CarriedEye):
+        if isinstance(self.renderer, TiltedEye):
             poses = self.renderer.full_poses(poses)
             for agent, (pitch, roll) in zip(walking, poses[:, 4:].tolist(), strict=True):
                 agent.tilt = pitch, roll

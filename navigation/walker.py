@@ -43,7 +43,7 @@ class Step:
         index: 0 for the first look.
         pose: Where the agent stands and faces as it looks.
         height: Of the ground beneath it (m).
-        tilt: Pitch and roll of its eye (rad); (0, 0) where it is level.
+        tilt: Pitch and roll of its eye (rad); None where the eye is always level.
         view: (height, width, 4) What it sees, RGBA (RGB where it comes from images without alpha); None where it was not drawn.
         encoded: (h, w) The feature image that the navigator gets of it; None likewise.
         looks: Headings that the navigator looked at for its decision.
@@ -70,7 +70,7 @@ class Step:
     index: int
     pose: Pose
     height: float
-    tilt: tuple[float, float]
+    tilt: tuple[float, float] | None
     view: UInt8[np.ndarray, "height width channels"] | None
     encoded: Float32[torch.Tensor, "h w"] | None
     looks: int
@@ -123,7 +123,7 @@ class Walker:
             None  # where it stood before its step, and how high; None after being put back
         )
         self.stopped: StopReason | None = None  # by the ground
-        self.tilt = (0.0, 0.0)  # of its eye: pitch and roll (rad)
+        self.tilt: tuple[float, float] | None = None  # of its eye at the last look: pitch and roll (rad)
 
     def sense(self) -> tuple[float, float]:
         """What its compass reads (rad), and its odometer since the look before (m)."""

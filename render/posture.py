@@ -1,4 +1,4 @@
-"""How a body holds its eye. Light to import: carried.py has what it does to views."""
+"""How a body holds its eye. Light to import: tilted_eye.py has what it does to views."""
 
 from typing import TYPE_CHECKING
 

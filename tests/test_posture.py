@@ -1,16 +1,23 @@
 """Bodies that stand on slopes, and eyes that pitch and roll with them."""
 
+import pickle
+
 import numpy as np
 import pytest
 from scenes import hills, mesh_world, post, random_poses, random_world, surface
 
+from tussock.navigation.cli.main import main
+from tussock.navigation.encoding import Encoding
+from tussock.navigation.evaluation import heading_field
 from tussock.navigation.experiment import Experiment
+from tussock.navigation.experiment_keys import views_key
 from tussock.navigation.experiment_settings import experiment_of, settings_of
+from tussock.navigation.models import PerfectMemory
 from tussock.navigation.training import training_source
-from tussock.render.carried import CarriedEye
 from tussock.render.eye import Eye
 from tussock.render.posture import Posture
 from tussock.render.renderer import Renderer, open_renderer
+from tussock.render.tilted_eye import TiltedEye
 from tussock.world.errors import SettingError
 from tussock.world.full_pose import FullPose, eye_axes, slopes_under
 from tussock.world.geometry import Route
@@ -23,14 +30,23 @@ def hilly():
     return mesh_world(hills(), *(post(x, x / 2, 0.2) for x in np.arange(0.5, 6, 0.5))).on_mesh()
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.7, np.pi / 2, -2.5])
+@pytest.mark.parametrize("slope", [(0.3, 0.1), (-0.7, 0.4)])
 @pytest.mark.parametrize("length", [0.01, 0.3])
-def test_a_body_on_a_slope_is_as_steep_as_the_slope(heading, length):
-    """On a plane that rises by 0.3 to the east and 0.1 to the north, whatever the length of the body."""
-    plane = mesh_world(surface(lambda x, y: 0.3 * x + 0.1 * y)).on_mesh()
-    (pitch,), (roll,) = slopes_under(plane, np.array([[3.0, 3.0, heading]]), length)
-    assert np.tan(pitch) == pytest.approx(0.3 * np.cos(heading) + 0.1 * np.sin(heading), abs=1e-5)
-    assert np.tan(roll) == pytest.approx(-0.3 * np.sin(heading) + 0.1 * np.cos(heading), abs=1e-5)  # its left is higher
+def test_the_upward_axis_of_a_body_on_a_plane_is_the_normal_wherever_it_faces(slope, length):
+    east, north = slope
+    plane = mesh_world(surface(lambda x, y: east * x + north * y)).on_mesh()
+    poses = np.column_stack([np.full((12, 2), 3.0), np.linspace(-3, 3, 12)])
+    pitch, roll = slopes_under(plane, poses, length)
+    axes = eye_axes(np.column_stack([poses, np.zeros(12), pitch, roll]))
+    normal = np.array([-east, -north, 1]) / np.hypot(1, np.hypot(east, north))
+    assert np.allclose(axes[:, 2], normal, atol=1e-4)  # the corners are float32
+
+
+def test_a_ledge_counts_as_the_end_of_the_ground():
+    low, high = surface(lambda x, y: 0 * x, high=3.0), surface(lambda x, y: 0 * x + 0.3, low=0.0, high=3.0) + [3, 0, 0]
+    ledge = mesh_world(low, high).on_mesh()
+    (pitch,), (roll,) = slopes_under(ledge, np.array([[2.998, 1.0, 0.0]]), 0.01)
+    assert (pitch, roll) == (0, 0)
 
 
 def test_a_body_at_the_edge_of_the_ground_takes_the_slope_of_the_other_end():
@@ -45,7 +61,7 @@ def test_flat_ground_and_a_level_gaze_leave_every_view_as_it_was(hilly):
     for world, posture in ((random_world(), Posture(gaze="body")), (hilly, Posture())):
         assert not posture.tilts(world)
         with Experiment(world=world, eye=SMALL, posture=posture).open_renderer(world) as renderer:
-            assert not isinstance(renderer, CarriedEye)
+            assert not isinstance(renderer, TiltedEye)
 
 
 def test_the_axes_of_an_eye_are_a_right_handed_frame_whose_first_is_where_it_looks():
@@ -64,7 +80,7 @@ def test_a_carried_eye_sees_what_the_full_poses_of_its_body_show(hilly):
     pitch, roll = slopes_under(hilly, poses, 0.05)
     height = hilly.ground_height(poses[:, :2]) + SMALL.z
     with open_renderer(hilly, SMALL, "cpu") as plain:
-        carried = CarriedEye(plain, Posture(gaze="body", body_length=0.05))
+        carried = TiltedEye(plain, Posture(gaze="body", body_length=0.05))
         assert isinstance(carried, Renderer)
         expected = plain.render(np.column_stack([poses, height, pitch, roll]))
         assert np.array_equal(carried.render(poses), expected)
@@ -77,13 +93,16 @@ def test_the_noise_belongs_to_the_place_and_learned_views_have_their_own():
     world = random_world()
     poses = random_poses(400)
     with open_renderer(world, SMALL, "cpu") as plain:
-        carried = CarriedEye(plain, Posture(pitch_noise=0.1, roll_noise=0.03), seed=4)
+        carried = TiltedEye(plain, Posture(pitch_noise=0.1, roll_noise=0.03), seed=4)
         tilt = carried.full_poses(poses)[:, 4:]
         assert np.allclose(tilt.mean(axis=0), 0, atol=0.02)
         assert np.allclose(tilt.std(axis=0), (0.1, 0.03), rtol=0.15)
         assert np.array_equal(np.concatenate([carried.full_poses(poses[k : k + 1]) for k in range(9)])[:, 4:], tilt[:9])
         learned = training_source(carried).full_poses(poses)[:, 4:]
-        other = CarriedEye(plain, carried.posture, seed=5).full_poses(poses)[:, 4:]
+        other = TiltedEye(plain, carried.posture, seed=5).full_poses(poses)[:, 4:]
+        for eye in (carried, carried.training):
+            again = pickle.loads(pickle.dumps(eye))
+            assert np.array_equal(again.full_poses(poses), eye.full_poses(poses))
         for noise in (learned, other):
             assert abs(np.corrcoef(noise[:, 0], tilt[:, 0])[0, 1]) < 0.2
 
@@ -97,8 +116,8 @@ def test_a_walk_over_hills_pitches_and_rolls_and_says_so(hilly):
     facing = np.array([body.column(name) for name in ("x_m", "y_m")]).T
     poses = np.column_stack([facing, np.radians(body.column("heading_deg"))])
     pitch, roll = slopes_under(hilly, poses, 0.01)
-    assert np.allclose(np.array([value or 0 for value in body.column("pitch_deg")]), np.degrees(pitch), atol=1e-6)
-    assert np.allclose(np.array([value or 0 for value in body.column("roll_deg")]), np.degrees(roll), atol=1e-6)
+    assert np.allclose(body.column("pitch_deg"), np.degrees(pitch), atol=1e-6)
+    assert np.allclose(body.column("roll_deg"), np.degrees(roll), atol=1e-6)
     assert np.abs(pitch).max() > np.radians(5)
 
 
@@ -112,10 +131,41 @@ def test_settings_come_back_and_decide_the_run():
         experiment_of({"pitch_noise_deg": -1})
 
 
+def test_runs_of_a_sweep_share_views_only_where_their_noise_is_the_same():
+    same = {"world": "tiny", "world_seed": 1, "route_seed": 1}
+    for noise, shared in ((0.0, True), (3.0, False)):
+        one, other = (experiment_of(same | {"roll_noise_deg": noise, "seed": seed}) for seed in (1, 2))
+        assert (views_key(one) == views_key(other)) == shared
+
+
+def test_what_turns_views_later_refuses_a_tilted_eye(hilly, tmp_path, capfd):
+    with open_renderer(hilly, SMALL, "cpu") as renderer:
+        tilted = TiltedEye(renderer, Posture(gaze="body"))
+        with pytest.raises(SettingError, match="turning views"):
+            heading_field(PerfectMemory(), Encoding.named("grey"), tilted, np.array([[3.0, 3.0]]))
+    command = [
+        "database",
+        "grid",
+        "--world",
+        "tiny",
+        "--roll-noise-deg",
+        "3",
+        "--spacing-m",
+        "3",
+        "--out",
+        str(tmp_path / "grid"),
+    ]
+    with pytest.raises(SystemExit) as end:
+        main(command)
+    assert end.value.code == 2
+    assert "level eye" in capfd.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_image_databases_and_the_cuda_renderer_refuse_it(tmp_path):
     with pytest.raises(SettingError, match="--gaze"):
         experiment_of({"gaze": "body", "route_database": tmp_path})
     with open_renderer(random_world(), SMALL, "cpu") as renderer:
         renderer.backend = "cuda"
         with pytest.raises(SettingError, match="level eyes only"):
-            CarriedEye(renderer, Posture(pitch_noise=0.1))
+            TiltedEye(renderer, Posture(pitch_noise=0.1))

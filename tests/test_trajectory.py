@@ -18,7 +18,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "trajectory.md"
 def step(index: int, x: float, y: float, **changes) -> Step:
     """A look of an agent at (x, y) m, which follows the x axis."""
     values = {
-        "height": 0.0, "tilt": (0.0, 0.0),
+        "height": 0.0, "tilt": None,
         "view": None, "encoded": None, "looks": 1, "familiarity": None, "scanned": None, "aim": 0.0, "turn": 0.0,
         "match": None, "progress": None, "signals": {}, "touched": False, "displaced": False, "view_distance": None,
         "deviation": abs(y), "along": x, "side": 1 if y >= 0 else -1, "goal_distance": 9.0 - x, "error": 0.0, "reason": None,

@@ -365,7 +365,7 @@ def test_the_public_names_are_listed_and_each_loads():
         "turn_of_columns",
         "no_progress",
     }
-    names |= {"InputError", "SettingError", "FileError", "DiskFullError", "MissingDependencyError"}
+    names |= {"FullPose", "InputError", "SettingError", "FileError", "DiskFullError", "MissingDependencyError"}
     assert set(dir(world_package)) == set(world_package.__all__) == names
     for name in names:
         assert getattr(world_package, name).__name__ == name

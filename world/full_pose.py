@@ -48,24 +48,27 @@ def eye_axes(poses: Float[np.ndarray, "n 6"]) -> Float[np.ndarray, "n 3 3"]:
 def slopes_under(
     world: "World", poses: Float[np.ndarray, "n 3"], length: float
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Pitch and roll (rad) of a body that stands on the ground: the slopes ahead and to the side over its length.
+    """Pitch and roll (rad) of a body that stands on the ground: on a plane, its upward axis is the normal of the plane.
 
-    Where there is no ground beneath one of its ends, the slope to the other end counts; beneath neither, 0.
+    The slopes are those between its ends ahead and behind, left and right. An end beneath which there is no ground, or ground that
+    is too steep to step on, as at a ledge, does not count: then the slope is that from the middle to the other end, without either 0.
 
     Args:
         world: The world.
         poses: x (m), y (m) and heading (rad).
         length: Of the body, which is taken to be as wide as long (m).
     """
-    if world.terrain is None:
+    terrain = world.terrain
+    if terrain is None:
         return np.zeros(len(poses)), np.zeros(len(poses))
-    here = world.ground_height(poses[:, :2])
+    here, reach = world.ground_height(poses[:, :2]), length / 2
 
-    def slope(direction: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        reach = length / 2 * np.column_stack([np.cos(direction), np.sin(direction)])
-        front, back = world.ground_height(poses[:, :2] + reach), world.ground_height(poses[:, :2] - reach)
-        ends = np.isfinite(front).astype(int) + np.isfinite(back)
-        rise = np.where(np.isfinite(front), front, here) - np.where(np.isfinite(back), back, here)
-        return np.where(ends == 0, 0.0, np.arctan2(rise, np.maximum(ends, 1) * length / 2))
+    def rise(direction: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Rise for each metre in a direction."""
+        away = reach * np.column_stack([np.cos(direction), np.sin(direction)])
+        rises = np.stack([side * (world.ground_height(poses[:, :2] + side * away) - here) for side in (1, -1)])
+        counts = np.isfinite(rises) & ~terrain.is_too_steep(reach, np.nan_to_num(rises))
+        return np.where(counts, rises, 0).sum(axis=0) / np.maximum(counts.sum(axis=0), 1) / reach
 
-    return slope(poses[:, 2]), slope(poses[:, 2] + np.pi / 2)
+    pitch = np.arctan(rise(poses[:, 2]))
+    return pitch, np.arctan(rise(poses[:, 2] + np.pi / 2) * np.cos(pitch))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from tussock.render.posture import Posture
 from tussock.world.errors import InputError, SettingError
 
 from ..training_setup import ROUTE_SPACING
@@ -115,8 +116,13 @@ def write(options: ViewOptions, world: "World", poses: "Poses | Grid", out: Path
     """Draw a database, showing progress."""
     from tussock.render.images.writing import write_database
 
-    began = time.perf_counter()
-    with options.surroundings().open_renderer(world) as renderer:
+    began, surroundings = time.perf_counter(), options.surroundings()
+    if surroundings.posture != Posture():
+        raise SettingError(
+            "the images of a database are turned later, so they are drawn by a level eye: leave out --gaze, --body-length-m, "
+            "--pitch-noise-deg and --roll-noise-deg"
+        )
+    with surroundings.open_renderer(world) as renderer:
         message(f"renderer: {renderer.backend}")
         with progress("drawing", "views") as report:
             database, rendered = write_database(out, renderer, poses, report)

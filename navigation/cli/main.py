@@ -32,7 +32,8 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"tussock {version('tussock')}")
         return
     if not arguments or arguments[0] in ("-h", "--help"):
-        print(overview())
+        with output_may_end():
+            print(overview(), flush=True)
         sys.exit(0 if arguments else 2)
     if arguments[0] not in COMMANDS:
         fail(f"unknown command {arguments[0]!r}{suggestion(arguments[0], COMMANDS)}; tussock --help lists all")
@@ -44,15 +45,18 @@ def main(arguments: list[str] | None = None) -> None:
     )
     end_on_signals()
     try:
-        check_names(vars(command))
+        check_names(command)
         if command.json:
             with library_messages(), standard_output_as_error():
                 result = command.run()
-            print(json.dumps(result), flush=True)
+            with output_may_end():
+                print(json.dumps(result), flush=True)
         else:
             with library_messages():
                 result = command.run()
-            show(result)
+            with output_may_end():
+                show(result)
+                sys.stdout.flush()
         if result.get("ok") is False:  # what was to be checked is not as it should be
             sys.exit(1)
     except InputError as error:
@@ -61,8 +65,6 @@ def main(arguments: list[str] | None = None) -> None:
         if error.name != "torch":
             raise
         fail("this command needs torch, which is not installed; install it: pip install torch")
-    except BrokenPipeError:  # what reads the output has enough of it, as head does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except RuntimeError as error:
@@ -136,6 +138,15 @@ def tune_python() -> None:
     atexit.register(gc.freeze)
     # Seconds. With the usual 0.005, a thread that imports stops one that encodes views for that long at each array.
     sys.setswitchinterval(0.0002)
+
+
+@contextmanager
+def output_may_end() -> Iterator[None]:
+    """Within the block, it is no error where what reads the output stops reading, as `head` does."""
+    try:
+        yield
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 
 from ..experiment_fields import MODEL_SUFFIX
@@ -119,6 +120,10 @@ class TrainCommand(ModelOptions):
                 f"{self.model}: {model} learns all its views at once and cannot go on; give --model '{model}'"
             )
         check_can_be_saved(model)
+        if experiment.posture != Posture():
+            message(
+                "the file does not keep --gaze, --pitch-noise-deg and --roll-noise-deg: give them again to what uses it"
+            )
         world, route = experiment.open_world_and_route()
         with experiment.open_renderer(world) as renderer, progress("drawing", "views") as report:
             wanted = experiment.training_poses(world, route)

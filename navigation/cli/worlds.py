@@ -99,15 +99,15 @@ class ViewCommand(ViewOptions):
 
     def _tilted(self, renderer: "Renderer", poses: "np.ndarray") -> "np.ndarray":
         """Poses with the pitch and the roll that are asked for."""
-        from tussock.render.carried import CarriedEye
         from tussock.render.poses import poses_of_eye
+        from tussock.render.tilted_eye import TiltedEye
 
         tilt = [None if angle is None else math.radians(angle) for angle in (self.pitch_deg, self.roll_deg)]
         if tilt == [None, None]:
             return poses
         if not all(angle is None or abs(angle) <= math.pi for angle in tilt):  # nan as well
             raise SettingError("--pitch-deg and --roll-deg are from -180 to 180")
-        carried = isinstance(renderer, CarriedEye)
+        carried = isinstance(renderer, TiltedEye)
         full = renderer.full_poses(poses) if carried else poses_of_eye(renderer.world, renderer.eye, poses)
         for column, angle in enumerate(tilt, start=4):
             full[:, column] = full[:, column] if angle is None else angle

@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
+from tussock.render.tilted_eye import check_level
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds, Pose, Route, columns_of_turn, wrap_angle
 from tussock.world.progress import Progress, printed
@@ -101,6 +102,7 @@ def positions_around(
     Raises:
         SettingError: Where there are too few or too many.
     """
+    check_level(renderer)
     low, high = _extent(around, within)
     if isinstance(renderer, DatabaseViews):
         poses, spacing = renderer.poses, float(renderer.reach * np.sqrt(2))

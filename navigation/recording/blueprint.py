@@ -61,7 +61,7 @@ class Shown:
             self,
             recognised=self.recognised or (step.match is not None and learned),
             scan=self.scan or step.familiarity is not None,
-            tilt=self.tilt or any(step.tilt),
+            tilt=self.tilt or step.tilt is not None,
             **{kind: tuple(dict.fromkeys([*getattr(self, kind), *found])) for kind, found in names.items()},
         )
 

@@ -16,9 +16,9 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from tussock.render.carried import CarriedEye
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
+from tussock.render.tilted_eye import TiltedEye
 from tussock.world.geometry import Route
 from tussock.world.scene import World
 
@@ -200,7 +200,7 @@ class Recording:
         names = {"deviation/m": "deviation from the route (m)", "error/degrees": "heading error (degrees)"}
         for (entity, name), colour in zip(names.items(), (PATH_COLOUR, MATCH_COLOUR), strict=True):
             self._log(entity, rr.SeriesLines(names=name, colors=colour), static=True)
-        if isinstance(self._renderer, CarriedEye):
+        if isinstance(self._renderer, TiltedEye):
             self._log(TILT, rr.SeriesLines(colors=[PATH_COLOUR, ROUTE_COLOUR], names=["pitch", "roll"]), static=True)
         self._log(GUIDES, rr.SeriesLines(colors=[GUIDE_COLOUR] * 2, names=["45 left", "45 right"]), static=True)
         for entity, colour in MARKS.items():
@@ -237,7 +237,7 @@ class Recording:
         guides = np.tile([45.0, -45.0], len(steps))
         self._send(GUIDES, steps, rr.Scalars.columns(scalars=guides).partition([2] * len(steps)))
         if self._shown.tilt:
-            tilts = np.degrees([step.tilt for step in steps])
+            tilts = np.degrees([step.tilt or (0.0, 0.0) for step in steps])
             self._send(TILT, steps, rr.Scalars.columns(scalars=tilts.ravel()).partition([2] * len(steps)))
         self._send("goal/m", steps, rr.Scalars.columns(scalars=[step.goal_distance for step in steps]))
         self._send("looks/headings", steps, rr.Scalars.columns(scalars=[step.looks for step in steps]))

@@ -1,10 +1,11 @@
-"""An eye that a body carries: it pitches and rolls with the ground beneath the body, and sways.
+"""An eye that pitches and rolls with the body that carries it, or has noise on its pitch and roll.
 
-Views at planar poses then are those of the full poses that the body gives the eye. The sway at a place is drawn from a seed and the
-pose, so it is the same however many views are drawn together, and whenever they are drawn again; views that are learned have a sway of
+Views at planar poses then are those of the full poses that the body gives the eye. The noise at a pose is drawn from a seed and the
+pose, so it is the same however many views are drawn together, and whenever they are drawn again; views that are learned have noise of
 their own, as the body comes to the same place another time.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,15 @@ from jaxtyping import Float
 
 from tussock.world.errors import SettingError
 from tussock.world.full_pose import slopes_under
+from tussock.world.geometry import rounded
 
 from .poses import AnyPoses, Views, as_poses, poses_of_eye
 from .posture import Posture
 from .renderer import Renderer
 
 
-class CarriedEye:
-    """A renderer whose eye a body carries, a `Renderer`.
+class TiltedEye:
+    """A renderer whose eye pitches and rolls, a `Renderer`.
 
     Args:
         renderer: Draws its views.
@@ -38,10 +40,10 @@ class CarriedEye:
             )
         self._renderer, self.posture, self._seed, self._learns = renderer, posture, seed, learns
         self.world, self.eye, self.backend = renderer.world, renderer.eye, renderer.backend
-        self.training = self if learns else CarriedEye(renderer, posture, seed, learns=True)
+        self.training = self if learns else TiltedEye(renderer, posture, seed, learns=True)
 
     def __reduce__(self) -> Any:
-        return CarriedEye, (self._renderer, self.posture, self._seed)
+        return partial(TiltedEye, learns=self._learns), (self._renderer, self.posture, self._seed)
 
     def full_poses(self, poses: AnyPoses) -> Float[np.ndarray, "n 6"]:
         """The full poses of the eye at planar poses; full ones are as they are."""
@@ -53,10 +55,10 @@ class CarriedEye:
             full[:, 4:] = np.column_stack(slopes_under(self.world, poses, self.posture.body_length))
         if self.posture.pitch_noise or self.posture.roll_noise:
             spread = self.posture.pitch_noise, self.posture.roll_noise
-            full[:, 4:] += spread * np.array([self._sway(pose) for pose in poses]).reshape(-1, 2)
+            full[:, 4:] += spread * np.array([self._noise(pose) for pose in rounded(poses)]).reshape(-1, 2)
         return full
 
-    def _sway(self, pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
+    def _noise(self, pose: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
         """Two normal numbers that belong to a pose."""
         bits = (pose + 0.0).view(np.uint64).tolist()  # + 0.0: of -0.0 and 0.0 the same
         return np.random.default_rng([self._seed, int(self._learns), *bits]).standard_normal(2)
@@ -69,8 +71,17 @@ class CarriedEye:
         """Close the renderer."""
         self._renderer.close()
 
-    def __enter__(self) -> "CarriedEye":
+    def __enter__(self) -> "TiltedEye":
         return self
 
     def __exit__(self, kind, error, traceback) -> None:
         self.close()
+
+
+def check_level(renderer: Renderer) -> None:
+    """Refuse an eye that pitches or rolls where views are drawn once and then turned as images. Raises SettingError."""
+    if isinstance(renderer, TiltedEye):
+        raise SettingError(
+            "headings are tested by turning views, and an eye that pitches or rolls would see something else after a turn: leave out "
+            "gaze, pitch_noise_deg and roll_noise_deg; walks take them"
+        )
