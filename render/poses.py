@@ -51,7 +51,7 @@ def poses_of_eye(world: World, eye: Eye, poses: AnyPoses) -> Float[np.ndarray, "
     """The full poses of an eye. At a planar pose it is level, at its height above the ground there.
 
     Raises:
-        SettingError: A pose is not valid (see `as_poses`), or there is no ground beneath a planar one.
+        SettingError: A pose is not valid (see `as_poses`), or a planar one has no ground beneath it.
     """
     poses = as_poses(poses, full=True)
     if poses.shape[1] == 6:

@@ -50,8 +50,8 @@ def slopes_under(
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Pitch and roll (rad) of a body that stands on the ground: on a plane, its upward axis is the normal of the plane.
 
-    The slopes are those between its ends ahead and behind, left and right. An end beneath which there is no ground, or ground that
-    is too steep to step on, as at a ledge, does not count: then the slope is that from the middle to the other end, without either 0.
+    The slopes are those between its ends ahead and behind, left and right. Only ends count that have ground which is not too
+    steep to step on, so none beyond a ledge. With one such end the slope is that from the middle to it; without any it is 0.
 
     Args:
         world: The world.

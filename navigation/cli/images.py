@@ -144,12 +144,10 @@ class CatchmentCommand(ModelOptions):
 
         from tussock.world.geometry import Pose
 
-        from ..training import training_source
-
         if not isinstance(references, Pose):
             return experiment.train(renderer, experiment.open_route(renderer.world)).model.model
         model = experiment.make_model()
-        model.fit(experiment.encoding.for_eye(experiment.eye).at(training_source(renderer), np.array([references])))
+        model.fit(experiment.encoding.for_eye(experiment.eye).at(renderer, np.array([references])))
         return model
 
 

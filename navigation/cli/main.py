@@ -142,7 +142,7 @@ def tune_python() -> None:
 
 @contextmanager
 def output_may_end() -> Iterator[None]:
-    """Within the block, it is no error where what reads the output stops reading, as `head` does."""
+    """Go on quietly after the block where what reads the output stops reading, as `head` does."""
     try:
         yield
     except BrokenPipeError:

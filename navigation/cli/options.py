@@ -126,7 +126,7 @@ class ViewOptions(MeshOptions):
     body_length_m: float = default(Posture, "body_length")
     """Length over which the ground's slope tilts the body, for --gaze body."""
     pitch_noise_deg: float = degrees(default(Posture, "pitch_noise"))
-    """Standard deviation of noise on the pitch of the eye, drawn anew at each place."""
+    """Standard deviation of noise on the pitch of the eye; each pose has its own."""
     roll_noise_deg: float = degrees(default(Posture, "roll_noise"))
     """Standard deviation of noise on its roll."""
 
