@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tussock.world.errors import InputError, MissingDependencyError, SettingError
+from tussock.world.errors import InputError, MissingDependencyError
 from tussock.world.scene import World
 
 from .compile import SIMULATED, config
 from .eye import Eye
-from .poses import AnyPoses, Views, poses_of_eye
+from .poses import AnyPoses, Views, frames_of, poses_of_eye
 from .scanline_kernels import find_directions
 from .scene_arrays import Scene
 
@@ -46,12 +46,11 @@ class CudaRenderer:
 
     def __init__(self, world: World, eye: Eye):
         cuda = _cuda()
-        from .cuda_kernels import THREADS, averaging_kernel, clear, drawing_kernels
+        from .cuda_kernels import THREADS
 
         self.world, self.eye, self._cuda, self._lock = world, eye, cuda, Lock()
         scene = Scene.of(world, eye)
-        textured = scene.lookup is not None
-        self._kernels, self._threads = (clear, *drawing_kernels(textured), averaging_kernel(textured)), THREADS
+        self._textured, self._threads = scene.lookup is not None, THREADS
         triangles, rays, lookup = scene.triangles, scene.rays, scene.lookup or ()
         size = len(rays.azimuths), len(rays.tangents)
         self._azimuths, self._numbers = rays.azimuths, (rays.top, rays.rows_per_rad, *size)
@@ -70,12 +69,15 @@ class CudaRenderer:
         """See `Renderer.render`. Threads take turns.
 
         Raises:
-            InputError: Also where the memory of the GPU is too small, and for an eye that pitches or rolls.
+            InputError: Also where the memory of the GPU is too small.
         """
         eyes = poses_of_eye(self.world, self.eye, poses)
-        if eyes[:, 4:].any():
-            raise SettingError("the cuda renderer draws level eyes only; for pitch and roll use the cpu renderer")
         views = np.empty((len(eyes), self.eye.height, self.eye.width, 4), dtype=np.uint8)
+        tilted = eyes[:, 4:].any(axis=1)
+        if tilted.any() and not tilted.all():  # a level view has the same bytes among tilted ones
+            for some in (tilted, ~tilted):
+                views[some] = self.render(eyes[some])
+            return views
         with self._lock, _enough_memory():
             if self._triangles is None:
                 raise InputError("this renderer is closed; open another one")
@@ -86,8 +88,16 @@ class CudaRenderer:
 
     def _draw(self, eyes: Float[np.ndarray, "n 6"], views: Views) -> None:
         """Draw one batch of views."""
-        cuda, threads, (clear, narrow, wide, average) = self._cuda, self._threads, self._kernels
-        n, (*_, columns, rows) = len(eyes), self._numbers
+        from .cuda_kernels import averaging_kernel, clear, drawing_kernels
+
+        cuda, threads, n, (*_, columns, rows) = self._cuda, self._threads, len(eyes), self._numbers
+        frames, tilted = np.empty((0, 4, 3)), bool(eyes[:, 4:].any())
+        if tilted:
+            frames, eyes = (
+                frames_of(eyes),
+                eyes * [1, 1, 0, 1, 0, 0],
+            )  # in its own frame an eye faces along the first axis
+        (narrow, wide), average = drawing_kernels(self._textured, tilted), averaging_kernel(self._textured, tilted)
         directions = np.empty((n, 2, columns))
         for heading, of_view in zip(eyes[:, 2], directions, strict=True):
             find_directions(self._azimuths, heading, of_view)
@@ -103,6 +113,7 @@ class CudaRenderer:
             self._numbers,
             self._tangents,
             cuda.to_device(np.ascontiguousarray(eyes[:, :4])),
+            cuda.to_device(frames),
             cuda.to_device(directions),
             self._lookup,
             keys,

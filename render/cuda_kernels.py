@@ -48,6 +48,30 @@ def _view_of(eyes, numbers, v):
     return View(eyes[v, 0], eyes[v, 1], eyes[v, 3], eyes[v, 2], top, rows_per_rad, width, height, 0, width)
 
 
+def _tilting(tilted: bool) -> tuple[Any, Any]:
+    """`corner` and `weights_along` for the eye of a view, which is level or tilted. A tilted one sees along its own axes, `frames[v]`."""
+
+    @_device
+    def corner_of(corners, k, i, view, frames, v):
+        x, y, z = corner(corners, k, i, view)
+        if tilted:
+            ahead, left, up = frames[v, 1], frames[v, 2], frames[v, 3]
+            return (
+                ahead[0] * x + ahead[1] * y + ahead[2] * z,
+                left[0] * x + left[1] * y + left[2] * z,
+                up[0] * x + up[1] * y + up[2] * z,
+            )
+        return x, y, z
+
+    @_device
+    def weights_of(corners, label, view, frames, v, cos, sin):
+        if tilted:
+            return weights_along(corners, label, view, frames[v], cos, sin)
+        return weights_along(corners, label, view, None, cos, sin)
+
+    return corner_of, weights_of
+
+
 @_device
 def _apart(azimuth, other):
     """How far an azimuth lies from another one (rad)."""
@@ -59,12 +83,11 @@ def _apart(azimuth, other):
 
 
 @_device
-def _columns(corners, i, view):
-    """The first column (0..width-1) that triangle i of a leaf may be in, and the last one, which may exceed width - 1.
+def _columns(a, b, c, view):
+    """The first column (0..width-1) that a triangle may be in, and the last one, which may exceed width - 1.
 
     See `find_candidates`.
     """
-    a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
     az_a = math.atan2(np.float32(a[1]), np.float32(a[0]))
     az_b = math.atan2(np.float32(b[1]), np.float32(b[0]))
     az_c = math.atan2(np.float32(c[1]), np.float32(c[0]))
@@ -100,11 +123,12 @@ def _set_up(a, b, c, cull):
     return seen, (bound(a, b, volume), bound(b, c, volume), bound(c, a, volume)), depth_plane(a, b, c, volume)
 
 
-def _column_drawer(textured: bool) -> Any:
+def _column_drawer(textured: bool, tilted: bool) -> Any:
     """A function that draws a triangle, set up, in one column of a view."""
+    _, weights_of = _tilting(tilted)
 
     @_device
-    def draw_column(edges, plane, column, v, label, view, directions, tangents, lookup, keys):
+    def draw_column(edges, plane, column, v, label, view, frames, directions, tangents, lookup, keys):
         cos, sin = directions[v, 0, column], directions[v, 1, column]
         low, high = covered(edges[0], edges[1], edges[2], cos, sin)
         if low > high:
@@ -119,7 +143,7 @@ def _column_drawer(textured: bool) -> Any:
         base, slope = plane[0] * cos + plane[1] * sin, plane[2]
         if textured:
             corners, index, holes, uv, corner_colours, texels, textures, thresholds, _ = lookup
-            has_holes, k, weights = holes[label], index[label], weights_along(corners, label, view, None, cos, sin)
+            has_holes, k, weights = holes[label], index[label], weights_of(corners, label, view, frames, v, cos, sin)
         for row in range(first, last + 1):
             t, key = tangents[row], key_of(base + slope * tangents[row], label)
             if key <= keys[v, column, row]:
@@ -133,73 +157,86 @@ def _column_drawer(textured: bool) -> Any:
 
 
 @cache
-def drawing_kernels(textured: bool) -> tuple[Any, Any]:
-    """`draw_narrow` and `draw_wide`, for worlds with or without textures.
+def drawing_kernels(textured: bool, tilted: bool) -> tuple[Any, Any]:
+    """`draw_narrow` and `draw_wide`, for worlds with or without textures, and for level or tilted eyes.
 
     Their arguments: `blocks`, `labels` and `cull`, of `Triangles`; `numbers`, the upper edge (rad), rows of rays in one radian, columns
-    and rows of rays; `tangents`, of `Rays`; `eyes` (n, 4), x (m), y (m), heading (rad) and height (m); `directions` (n, 2, width), cosines
-    and sines of the azimuths of the columns in the world; `lookup`, as `Lookup`, () in a plain world; `keys` (n, width, height) of rays,
-    see `key_of`; `queue` (m,), wide triangles, each as the number of its view times the number of triangles plus its own number; and how
-    many they are, `queued` (1,).
+    and rows of rays; `tangents`, of `Rays`; `eyes` (n, 4), x (m), y (m), heading (rad, 0 for tilted eyes) and height (m); `frames`
+    (n, 4, 3) as in `draw_views`, (0, 4, 3) for level eyes; `directions` (n, 2, width), cosines and sines of the azimuths of the columns,
+    in the world or in the frame of a tilted eye; `lookup`, as `Lookup`, () in a plain world; `keys` (n, width, height) of rays, see
+    `key_of`; `queue` (m,), wide triangles, each as the number of its view times the number of triangles plus its own number; and how many
+    they are, `queued` (1,).
     """
-    draw_column = _column_drawer(textured)
+    draw_column, (corner_of, _) = _column_drawer(textured, tilted), _tilting(tilted)
 
     @_device
-    def draw(i, corners, first, last, step, v, view, label, cull, tangents, directions, lookup, keys):
-        """Draw triangle i of a leaf in every `step`-th column from `first` to `last`."""
-        a, b, c = corner(corners, 0, i, view), corner(corners, 1, i, view), corner(corners, 2, i, view)
+    def corners_of(blocks, i, view, frames, v):
+        """The corners of triangle i."""
+        corners, k = blocks[i // LEAF], i % LEAF
+        return (
+            corner_of(corners, 0, k, view, frames, v),
+            corner_of(corners, 1, k, view, frames, v),
+            corner_of(corners, 2, k, view, frames, v),
+        )
+
+    @_device
+    def draw(a, b, c, first, last, step, v, view, frames, label, cull, tangents, directions, lookup, keys):
+        """Draw a triangle in every `step`-th column from `first` to `last`."""
         seen, edges, plane = _set_up(a, b, c, cull)
         if seen:
             for column in range(first, last + 1, step):
                 at = column - view.width if column >= view.width else column
-                draw_column(edges, plane, at, v, label, view, directions, tangents, lookup, keys)
+                draw_column(edges, plane, at, v, label, view, frames, directions, tangents, lookup, keys)
 
     @_kernel
-    def draw_narrow(blocks, labels, cull, numbers, tangents, eyes, directions, lookup, keys, queue, queued):
+    def draw_narrow(blocks, labels, cull, numbers, tangents, eyes, frames, directions, lookup, keys, queue, queued):
         i, v = cuda.grid(1), cuda.blockIdx.y
         if i >= len(labels):
             return
-        view, corners = _view_of(eyes, numbers, v), blocks[i // LEAF]
-        first, last = _columns(corners, i % LEAF, view)
+        view = _view_of(eyes, numbers, v)
+        a, b, c = corners_of(blocks, i, view, frames, v)
+        first, last = _columns(a, b, c, view)
         if last - first >= NARROW:
             number = cuda.atomic.add(queued, 0, 1)
             if number < len(queue):
                 queue[number] = v * len(labels) + i
                 return
-        draw(i % LEAF, corners, first, last, 1, v, view, labels[i], cull, tangents, directions, lookup, keys)
+        draw(a, b, c, first, last, 1, v, view, frames, labels[i], cull, tangents, directions, lookup, keys)
 
     @_kernel
-    def draw_wide(blocks, labels, cull, numbers, tangents, eyes, directions, lookup, keys, queue, queued):
+    def draw_wide(blocks, labels, cull, numbers, tangents, eyes, frames, directions, lookup, keys, queue, queued):
         for number in range(cuda.blockIdx.x, min(queued[0], len(queue)), cuda.gridDim.x):
             v, i = queue[number] // len(labels), queue[number] % len(labels)
-            view, corners = _view_of(eyes, numbers, v), blocks[i // LEAF]
-            first, last = _columns(corners, i % LEAF, view)
+            view = _view_of(eyes, numbers, v)
+            a, b, c = corners_of(blocks, i, view, frames, v)
+            first, last = _columns(a, b, c, view)
             first, step = first + cuda.threadIdx.x, cuda.blockDim.x
-            draw(i % LEAF, corners, first, last, step, v, view, labels[i], cull, tangents, directions, lookup, keys)
+            draw(a, b, c, first, last, step, v, view, frames, labels[i], cull, tangents, directions, lookup, keys)
 
     return draw_narrow, draw_wide
 
 
 @cache
-def averaging_kernel(textured: bool) -> Any:
-    """`average`, which makes pixels (n, height, width) of keys, for worlds with or without textures.
+def averaging_kernel(textured: bool, tilted: bool) -> Any:
+    """`average`, which makes pixels (n, height, width) of keys, for worlds with or without textures, and for level or tilted eyes.
 
     Its arguments: see `drawing_kernels`; `rays` along each side of a pixel; `colours` and `weights` of `Paint`.
     """
+    _, weights_of = _tilting(tilted)
 
     @_device
-    def colour(key, lookup, colours, view, cos, sin, t):
+    def colour(key, lookup, colours, view, frames, v, cos, sin, t):
         label = key & 0xFFFFFFFF
         if textured:
             corners, index, _, uv, corner_colours, texels, textures, _, products = lookup
             k = np.int64(index[label])
             if k != PLAIN:
-                shares = weights_along(corners, label, view, None, cos, sin)
+                shares = weights_of(corners, label, view, frames, v, cos, sin)
                 return ray_colour(uv, corner_colours, texels, textures, products, label, k, shares, t)
         return colours[label]
 
     @_kernel
-    def average(numbers, tangents, eyes, directions, lookup, keys, rays, colours, weights, pixels):
+    def average(numbers, tangents, eyes, frames, directions, lookup, keys, rays, colours, weights, pixels):
         p, v = cuda.grid(1), cuda.blockIdx.y
         if p >= pixels.shape[1] * pixels.shape[2]:
             return
@@ -209,7 +246,7 @@ def averaging_kernel(textured: bool) -> Any:
             total, weight = np.int64(0), weights[row, i - row * rays]
             for j in range(column * rays, (column + 1) * rays):
                 cos, sin = directions[v, 0, j], directions[v, 1, j]
-                total += colour(keys[v, j, i], lookup, colours, view, cos, sin, tangents[i])
+                total += colour(keys[v, j, i], lookup, colours, view, frames, v, cos, sin, tangents[i])
             r = _plus_product(r, weight, float(total & 0xFFFF))
             g = _plus_product(g, weight, float(total >> 16 & 0xFFFF))
             b = _plus_product(b, weight, float(total >> 32 & 0xFFFF))

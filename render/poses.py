@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import SettingError
-from tussock.world.full_pose import FullPose
+from tussock.world.full_pose import FullPose, eye_axes
 from tussock.world.geometry import Pose
 from tussock.world.scene import World
 from tussock.world.settings import MAX_COORDINATE
@@ -63,3 +63,8 @@ def poses_of_eye(world: World, eye: Eye, poses: AnyPoses) -> Float[np.ndarray, "
             f"nothing can stand at pose {row}: {world.terrain.problem(*poses[row, :2].tolist())}; choose another"
         )
     return np.column_stack([poses, ground + eye.z, np.zeros((len(poses), 2))])
+
+
+def frames_of(poses: Float[np.ndarray, "n 6"]) -> Float[np.ndarray, "n 4 3"]:
+    """The frames of eyes at full poses: their positions (m), and the directions ahead, left and up."""
+    return np.concatenate([poses[:, None, [0, 1, 3]], eye_axes(poses)], axis=1)

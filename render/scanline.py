@@ -31,12 +31,11 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.errors import InputError, SettingError
-from tussock.world.full_pose import eye_axes
 from tussock.world.scene import World
 
 from .cores import core_count
 from .eye import Eye
-from .poses import AnyPoses, Views, poses_of_eye
+from .poses import AnyPoses, Views, frames_of, poses_of_eye
 from .scanline_kernels import draw_views
 from .scene_arrays import Scene
 
@@ -94,7 +93,7 @@ class ScanlineRenderer:
 
     def _draw(self, poses: Float[np.ndarray, "n 6"], views: Views, start: int, stop: int) -> None:
         """Draw columns start..stop-1 of the views at some poses, which are all level or all tilted."""
-        frames = np.concatenate([poses[:, None, [0, 1, 3]], eye_axes(poses)], axis=1) if poses[:, 4:].any() else None
+        frames = frames_of(poses) if poses[:, 4:].any() else None
         try:
             keys = self._scratch.pop()
         except IndexError:

@@ -34,10 +34,6 @@ class TiltedEye:
     """
 
     def __init__(self, renderer: Renderer, posture: Posture, seed: int = 0, *, learns: bool = False):
-        if renderer.backend == "cuda":
-            raise SettingError(
-                "the cuda renderer draws level eyes only; for an eye that pitches and rolls use the cpu renderer"
-            )
         self._renderer, self.posture, self._seed, self._learns = renderer, posture, seed, learns
         self.world, self.eye, self.backend = renderer.world, renderer.eye, renderer.backend
         self.training = self if learns else TiltedEye(renderer, posture, seed, learns=True)

@@ -9,11 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from renderer_laws import batches_and_callers_do_not_matter
-from scenes import hills, mesh_world, post, random_poses, random_texture, random_world, textured_world, world_of
+from scenes import (
+    full_poses,
+    hills,
+    mesh_world,
+    post,
+    random_poses,
+    random_texture,
+    random_world,
+    textured_world,
+    world_of,
+)
 
 from tussock.render.compile import SIMULATED
 from tussock.render.eye import Eye
-from tussock.render.poses import Poses
+from tussock.render.poses import AnyPoses
 from tussock.render.renderer import Renderer, open_renderer
 from tussock.world.errors import InputError, MissingDependencyError, SettingError
 from tussock.world.scene import World
@@ -41,7 +51,7 @@ def here(monkeypatch):
         monkeypatch.setattr(cuda_kernels, "THREADS", 32)
 
 
-def draws_as_the_cpu(world: World, eye: Eye, poses: Poses = POSES) -> None:
+def draws_as_the_cpu(world: World, eye: Eye, poses: AnyPoses = POSES) -> None:
     with open_renderer(world, eye, "cuda") as gpu, open_renderer(world, eye, "cpu") as cpu:
         assert isinstance(gpu, Renderer)
         views, exact = gpu.render(poses), cpu.render(poses)
@@ -70,6 +80,16 @@ def test_textures_and_holes(filter, wrap):
     textures = [random_texture(k, alpha=alpha, filter=filter, wrap=(wrap, wrap)) for k, alpha in enumerate(ALPHAS)]
     for colours in (False, True):
         draws_as_the_cpu(textured_world(textures, 1, N, colours=colours), SMALL)
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("textured", [False, True])
+def test_pitched_and_rolled_eyes(textured):
+    textures = [random_texture(k, alpha=alpha) for k, alpha in enumerate(ALPHAS)]
+    world = textured_world(textures, 1, N) if textured else random_world(2, N)
+    tilted = full_poses(world.field, len(POSES))
+    draws_as_the_cpu(world, SMALL, tilted)
+    draws_as_the_cpu(world, FINE, tilted[:2] * [[1, 1, 1, 1, 1, 1], [1, 1, 1, 1, 0, 0]])  # the second one is level
 
 
 @pytest.mark.usefixtures("here")
@@ -132,4 +152,4 @@ def test_in_the_simulator():
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", str(Path(__file__))]
     done = subprocess.run(command, env=os.environ | simulator, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
-    assert "14 passed, 1 skipped" in done.stdout
+    assert "16 passed, 1 skipped" in done.stdout

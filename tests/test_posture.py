@@ -162,10 +162,6 @@ def test_what_turns_views_later_refuses_a_tilted_eye(hilly, tmp_path, capfd):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_image_databases_and_the_cuda_renderer_refuse_it(tmp_path):
+def test_image_databases_refuse_it(tmp_path):
     with pytest.raises(SettingError, match="--gaze"):
         experiment_of({"gaze": "body", "route_database": tmp_path})
-    with open_renderer(random_world(), SMALL, "cpu") as renderer:
-        renderer.backend = "cuda"
-        with pytest.raises(SettingError, match="level eyes only"):
-            TiltedEye(renderer, Posture(pitch_noise=0.1))
