@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import typecheck
 from hypothesis import settings
-from jaxtyping import install_import_hook
 
-install_import_hook(["tussock.world", "tussock.render", "tussock.navigation"], "typecheck.check")
+typecheck.install()
 
 # Workers of pytest-xdist share the cores: more threads than one each would only wait for one another.
 if "PYTEST_XDIST_WORKER" in os.environ:
