@@ -29,17 +29,26 @@ SUSSEX = Path(__file__).parents[2] / "shared" / "sussex"
 # A worker of pytest-xdist gets whole files, in this order: none is left alone with a long one at the end.
 LONGEST = [
     "sweeps",
-    "fuzz",
-    "extending",
-    "gl_renderers",
-    "leaderboard",
-    "cli",
-    "database",
-    "protocols",
+    "navigators",
     "models",
+    "fuzz",
+    "cli",
+    "gl_renderers",
+    "world_generation",
+    "leaderboard",
+    "fields",
+    "protocols",
+    "collisions",
+    "model_oracles",
+    "environment",
+    "terrain_walks",
+    "images_only",
+    "database_check",
+    "batches",
     "experiment",
+    "package",
+    "database",
 ]
-LONGEST += ["world_generation", "environment", "terrain_walks", "database_check", "fields", "docs"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

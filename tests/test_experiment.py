@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 import tyro
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from navigators import AHEAD
 
@@ -446,8 +446,7 @@ def test_a_path_is_a_file_even_where_it_is_named_like_a_preset(tmp_path, monkeyp
 # The command that repeats a run
 
 
-@given(SETTINGS | DATABASES)
-def test_the_command_of_a_run_repeats_it(given_settings):
+def repeats_it(given_settings):
     experiment = experiment_of(given_settings)
     program, *arguments = shlex.split(run_command(experiment, "the folder"))
     command = parsed(arguments)
@@ -455,6 +454,19 @@ def test_the_command_of_a_run_repeats_it(given_settings):
     assert isinstance(command, RunCommand)
     assert command.out == Path("the folder")
     assert command.experiment() == experiment
+
+
+@settings(max_examples=30)
+@given(SETTINGS | DATABASES)
+def test_the_command_of_a_run_repeats_it(given_settings):
+    repeats_it(given_settings)
+
+
+@pytest.mark.slow
+@settings(max_examples=200)
+@given(SETTINGS | DATABASES)
+def test_the_command_of_a_run_repeats_it_in_many_examples(given_settings):
+    repeats_it(given_settings)
 
 
 def test_the_command_names_only_what_is_not_as_by_default():

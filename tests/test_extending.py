@@ -79,6 +79,7 @@ def test_commands_of_the_page_run_with_the_installed_package(installed, tmp_path
             run(command, installed, tmp_path)
 
 
+@pytest.mark.slow
 def test_the_script_of_the_page_runs(source, tmp_path):
     (script,) = [text for text in blocks("python") if not text.startswith("# ")]
     done = subprocess.run(

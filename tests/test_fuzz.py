@@ -1,4 +1,7 @@
-"""Any input is used or refused in one line: see fuzzing.py. Each property is tried on a few examples, the same in each run."""
+"""Any input is used or refused in one line: see fuzzing.py.
+
+Each property is tried on a few examples, the same in each run; by the quick tests on very few.
+"""
 
 import os
 import subprocess
@@ -31,10 +34,15 @@ LIMIT = 600  # seconds; only a process that hangs takes as long
     "file",
     ["fuzz_files", "fuzz_meshes", "fuzz_textures", "fuzz_databases", "fuzz_models", "fuzz_numbers", "fuzz_sweeps"],
 )
-def test_any_input_is_used_or_refused(file):
+@pytest.mark.parametrize(
+    "examples",
+    [["--examples", "6"], pytest.param([], marks=pytest.mark.slow)],
+    ids=["very few examples", "few examples"],
+)
+def test_any_input_is_used_or_refused(file, examples):
     paths = os.pathsep.join([str(HERE.parent), str(HERE), os.environ.get("PYTHONPATH", "")])
     run = subprocess.run(
-        [sys.executable, "-W", "error::RuntimeWarning", str(HERE / f"{file}.py")],
+        [sys.executable, "-W", "error::RuntimeWarning", str(HERE / f"{file}.py"), *examples],
         env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, errors="replace", timeout=LIMIT,
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr[-5000:]

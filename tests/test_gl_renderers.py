@@ -16,6 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from quick_cases import quick
 from scenes import full_poses, hills, mesh_world, post, random_poses, random_texture, textured_world
 
 from tussock.render import Eye, Renderer, gl, open_renderer
@@ -119,7 +120,11 @@ def test_tall_pixels_are_averaged_by_solid_angle(backend, garden):
 
 @pytest.mark.parametrize(
     ("preset", "share"),
-    [("tussock-field", 0.02), ("meadow", 0.02), ("scrub", 0.02), ("hay-meadow", 0.04), ("woodland", 0.06)],
+    quick(
+        [("tussock-field", 0.02), ("meadow", 0.02), ("scrub", 0.02), ("hay-meadow", 0.04), ("woodland", 0.06)],
+        ("tussock-field", 0.02),
+        ("scrub", 0.02),
+    ),
 )
 def test_agrees_in_generated_worlds(backend, preset, share):
     """Worlds full of leaves smaller than a pixel, which the pixels of a cube, in slightly other directions, may miss."""
@@ -236,7 +241,7 @@ def test_a_textured_quad(backend):
 
 @pytest.mark.parametrize("kind", FILTERS)
 @pytest.mark.parametrize("alpha", ALPHAS)
-@pytest.mark.parametrize("colours", [False, True])
+@pytest.mark.parametrize("colours", quick([False, True], True))
 def test_agrees_in_textured_worlds(backend, kind, alpha, colours):
     pairs = itertools.product(WRAPS, WRAPS)
     textures = [random_texture(i, wrap=pair, filter=kind, alpha=alpha, cutoff=0.15 * i) for i, pair in enumerate(pairs)]
@@ -322,12 +327,16 @@ def test_cube_faces_follow_the_eye():
     assert face_size_for(Eye()) == 1152
 
 
+@pytest.mark.parametrize(
+    "some", ["and (exact_renderer or textured_quad)", pytest.param("", marks=pytest.mark.slow)], ids=["a few", "all"]
+)
 @pytest.mark.parametrize("name", BACKENDS)
-def test_backend_in_its_own_process(name):
-    """The tests of a backend that this process cannot use run in another process."""
-    if gl.bound_backend() in (None, name):
+def test_backend_in_its_own_process(name, some):
+    """The tests of a backend that this process cannot use run in another process: a few with the quick tests, all with the slow ones."""
+    if name == (gl.bound_backend() or BACKENDS[0]):
         pytest.skip(f"{name} runs in this process")
-    command = [sys.executable, "-m", "pytest", __file__, "-k", f"{name} and not own_process", "-p", "no:cacheprovider"]
+    command = [sys.executable, "-m", "pytest", __file__, "-k", f"{name} and not own_process {some}"]
+    command += ["-p", "no:cacheprovider", *([] if some else ["-m", ""])]
     done = subprocess.run(
         command, capture_output=True, text=True, cwd=Path(__file__).parents[1], timeout=300, check=False
     )

@@ -6,6 +6,7 @@ import torch
 from commands import printed, tussock
 from hypothesis import given
 from hypothesis import strategies as st
+from quick_cases import quick
 from scenes import views
 from sklearn.metrics import average_precision_score
 
@@ -254,8 +255,13 @@ def databases(tmp_path_factory, tiny) -> list:
 WORLD = ["--world", "tiny", "--size", "90x20", "--route-length-m", 2]
 
 
-@pytest.mark.parametrize("source", ["world", "databases"])
-@pytest.mark.parametrize("at", [[], ["--at", "1.2,2,90"]])
+AT = ["--at", "1.2,2,90"]
+
+
+@pytest.mark.parametrize(
+    ("source", "at"),
+    quick([("world", []), ("world", AT), ("databases", []), ("databases", AT)], ("world", []), ("databases", AT)),
+)
 def test_commands_take_worlds_and_databases(capfd, databases, tmp_path, source, at):
     flags = WORLD if source == "world" else databases
     result = printed(capfd, "ridf", *flags, *at, "--out", tmp_path / "a.svg")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 from commands import printed, tussock
+from figure_laws import SAVE_FIGURE, not_drawn
 
 from tussock.navigation.benchmark.definition import BASE, BENCHMARK, BENCHMARKS, OF_ENTRY, QUICK, Benchmark
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
@@ -315,7 +316,8 @@ def test_results_that_do_not_compare_are_refused_before_the_first_run(tmp_path, 
         enter(lambda seed: make_model("random", seed=seed), "other", tmp_path, benchmark=TINY)
 
 
-def test_a_report_of_the_runs_and_any_name_of_an_entry_are_possible(capfd, entered, tmp_path):
+def test_a_report_of_the_runs_and_any_name_of_an_entry_are_possible(capfd, entered, tmp_path, monkeypatch):
+    monkeypatch.setattr(SAVE_FIGURE, not_drawn)
     out = shutil.copytree(entered[1].parents[1], tmp_path / "out")
     enter(lambda seed: make_model("random", seed=seed), "results", out, benchmark=TINY)
     assert printed(capfd, "report", out, "--worst", 0)["runs"] == len(TINY)

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import torch
 from commands import printed
+from quick_cases import quick
 from small_models import SMALL
 
 from tussock.navigation.body import Body
@@ -353,7 +354,7 @@ def test_agents_that_perceive_the_same_elsewhere_decide_the_same(learned):
             assert step.pose != other.pose
 
 
-@pytest.mark.parametrize("model", ANY_MODELS)
+@pytest.mark.parametrize("model", quick(ANY_MODELS, "perfect-memory", PLAIN))
 def test_it_steers_by_any_model(name, model):
     (steps,) = walks(experiment(name, model=model_of(model), training__spacing=0.25, stopping__max_steps=4))
     assert len(steps) == 5

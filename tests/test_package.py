@@ -60,15 +60,23 @@ def test_importing_tussock_loads_nothing_heavy():
     [
         ("--help", HEAVY),
         ("run --help", HEAVY),
-        ("sweep --help", HEAVY),
-        ("world --preset tiny --out w.ply", OF_FIGURES_AND_MODELS),
+        pytest.param("sweep --help", HEAVY, marks=pytest.mark.slow),
+        pytest.param("world --preset tiny --out w.ply", OF_FIGURES_AND_MODELS, marks=pytest.mark.slow),
         (f"view {TINY}", OF_FIGURES_AND_MODELS),
-        ("route --world tiny --length-m 1", OF_FIGURES_AND_MODELS),
-        (f"database route {TINY} --route-length-m 1 --spacing-m 0.5 --out d", OF_FIGURES_AND_MODELS),
+        pytest.param("route --world tiny --length-m 1", OF_FIGURES_AND_MODELS, marks=pytest.mark.slow),
+        pytest.param(
+            f"database route {TINY} --route-length-m 1 --spacing-m 0.5 --out d",
+            OF_FIGURES_AND_MODELS,
+            marks=pytest.mark.slow,
+        ),
         (f"evaluate {TINY} --route-length-m 1 --grid-m 0.5", WITHOUT_FIGURES),
-        (f"train {TINY} --route-length-m 1 --spacing-m 0.2", WITHOUT_FIGURES),
-        (f"run {TINY} --route-length-m 1 --spacing-m 0.2", "distributed sklearn trimesh"),
-        (f"run {TINY} --live --viewer rerun+http://127.0.0.1:1/proxy", WITHOUT_FIGURES),  # nothing listens there
+        pytest.param(f"train {TINY} --route-length-m 1 --spacing-m 0.2", WITHOUT_FIGURES, marks=pytest.mark.slow),
+        pytest.param(
+            f"run {TINY} --route-length-m 1 --spacing-m 0.2", "distributed sklearn trimesh", marks=pytest.mark.slow
+        ),
+        pytest.param(  # nothing listens there
+            f"run {TINY} --live --viewer rerun+http://127.0.0.1:1/proxy", WITHOUT_FIGURES, marks=pytest.mark.slow
+        ),
         ("play nothing", HEAVY),
     ],
 )

@@ -28,7 +28,8 @@ def digest(model: str, count: int, threads: int = 1, **settings: str) -> str:
     return done.stdout.split()[-1]
 
 
-@pytest.mark.parametrize("model", ["perfect-memory", pytest.param("chain", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["perfect-memory", "chain"])
 def test_older_instructions_change_no_step(model):
     assert digest(model, 1, 2, **LIBRARIES) == digest(model, 1)
 

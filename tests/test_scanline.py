@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+from quick_cases import quick
 from renderer_laws import batches_and_threads_do_not_matter, low_resolution_is_the_mean_over_each_pixels_solid_angle
 from scenes import (
     full_poses,
@@ -57,7 +58,16 @@ def share_different(a: np.ndarray, b: np.ndarray) -> float:
     return float((a != b).any(axis=-1).mean())
 
 
-@pytest.mark.parametrize("preset", ["tussock-field", "meadow", "scrub", "hay-meadow", "woodland", "tiny"])
+@pytest.mark.parametrize(
+    "preset",
+    quick(
+        ["tussock-field", "meadow", "scrub", "hay-meadow", "woodland", "tiny"],
+        "tussock-field",
+        "meadow",
+        "scrub",
+        "tiny",
+    ),
+)
 def test_equals_embree_in_generated_worlds(preset):
     world = World.generate(preset, seed=3)
     rng = np.random.default_rng(0)
@@ -86,7 +96,9 @@ def test_equals_embree_among_triangles_above_below_and_around_the_eye(span):
             assert share_different(renderer.render([pose])[0], embree(world, eye, pose)) < 0.001
 
 
-@pytest.mark.parametrize("name", ["tussock-field", "woodland", "random", "hills"])
+@pytest.mark.parametrize(
+    "name", quick(["tussock-field", "woodland", "random", "hills"], "tussock-field", "random", "hills")
+)
 def test_pitched_and_rolled_eyes_equal_embree(name):
     if name == "hills":
         world = mesh_world(hills(), *(post(x, x / 2, 0.2) for x in np.arange(0.5, 6, 0.5))).on_mesh()

@@ -25,6 +25,7 @@ import psutil
 import pytest
 from browser import WIDTHS, in_browser
 from commands import TUSSOCK, Process, printed, process_json, tussock
+from figure_laws import SAVE_FIGURE, not_drawn
 from PIL import Image
 from scale import fill, sweep_file
 
@@ -773,10 +774,11 @@ def test_the_report_of_a_sweep_stands_by_itself(swept, reported):
     assert all(f'id="{anchor}"' in html for anchor in [*anchors, *(f"walk-{key}" for key in results["worst"])])
 
 
-def test_the_title_of_a_sweep_is_that_of_its_page(tmp_path):
+def test_the_title_of_a_sweep_is_that_of_its_page(tmp_path, monkeypatch):
     path = written(tmp_path, 'title = "Who arrives?"\n' + SWEEP)
     fill(path, tmp_path / "out", 24)
     run_sweep(read_sweep(path), tmp_path / "out")  # of which nothing is missing
+    monkeypatch.setattr(SAVE_FIGURE, not_drawn)
     write_sweep_report(tmp_path / "out", worst=0)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "<title>Who arrives?</title>" in page
@@ -812,7 +814,9 @@ def test_a_walk_whose_world_is_gone_has_a_reason_in_place_of_figures(swept):
 def test_an_axis_with_very_many_choices_is_reported_in_ranges(tmp_path, monkeypatch):
     """The page and the numbers stay small. An interval of a range is that of its runs."""
     fill(sweep_file(tmp_path, 200), tmp_path / "out", 200)
-    whole = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]
+    with monkeypatch.context() as without_figures:
+        without_figures.setattr(SAVE_FIGURE, not_drawn)
+        whole = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]
     monkeypatch.setattr("tussock.navigation.sweeps.statistics.MAX_CHOICES", 9)
     monkeypatch.setattr("tussock.navigation.sweeps.statistics.RANGES", 3)
     ranges = write_sweep_report(tmp_path / "out", worst=0)["by"]["offset (m)"]

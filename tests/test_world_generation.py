@@ -10,6 +10,7 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
+from quick_cases import quick
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
@@ -28,6 +29,7 @@ from tussock.world.settings import describe
 
 KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree", "herb", "culm", "litter", "inner_tree"}
 PRESETS = {name: WORLDS.find(name)() for name in params.PRESETS}
+SEED = 5  # of most worlds here, so that each is generated once
 
 
 @cache
@@ -50,9 +52,9 @@ def bare(triangles) -> World:
 # Worlds
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", quick(PRESETS, "tussock-field", "meadow", "scrub", "tiny"))
 def test_the_same_seed_gives_the_same_bytes(preset):
-    assert digest(generated(preset, 3)) == digest(World.generate(PRESETS[preset], 3))
+    assert digest(generated(preset, SEED)) == digest(World.generate(PRESETS[preset], SEED))
 
 
 def test_other_seeds_give_other_worlds():
@@ -103,7 +105,7 @@ def rounded(*arrays) -> str:
 )
 def test_a_seed_keeps_giving_the_same_world_and_route(text, seed, known, route_seed, length, goal, known_route):
     """A change of these digests raises GENERATOR, and makes all results before it incomparable."""
-    world = World.generate(text, seed)
+    world = generated(text, seed)
     assert rounded(world.triangles, world.rgb) == known
     assert rounded(generate_route(world, route_seed, length, goal).xy) == known_route
 
@@ -111,8 +113,8 @@ def test_a_seed_keeps_giving_the_same_world_and_route(text, seed, known, route_s
 @pytest.mark.parametrize("apart", [0.0, 0.05, 0.3, 2.0])
 def test_plants_keep_apart_from_all_that_were_placed_before(apart):
     rng = np.random.default_rng(0)
-    for xy in (rng.uniform(-1, 9, (600, 2)), np.round(rng.uniform(-1, 9, (600, 2)), 1)):
-        for count in (0, 20, 600):
+    for xy in (rng.uniform(-1, 9, (300, 2)), np.round(rng.uniform(-1, 6, (300, 2)), 1)):
+        for count in (0, 20, 300):
             kept: list[np.ndarray] = []
             for point in xy:
                 if len(kept) < count and all(np.hypot(*(point - other)) > apart or apart == 0 for other in kept):
@@ -122,7 +124,7 @@ def test_plants_keep_apart_from_all_that_were_placed_before(apart):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_world_is_valid(preset):
-    world = generated(preset, 3)
+    world = generated(preset, SEED)
     assert world.triangles.dtype == np.float32
     assert world.rgb.dtype == np.uint8
     assert np.isfinite(world.triangles).all()
@@ -140,7 +142,7 @@ def test_tiny_is_tiny_with_any_seed():
 
 
 def test_the_default_world_is_as_large_as_planned():
-    assert 15_000 <= len(generated("tussock-field", 3).triangles) <= 27_000
+    assert 15_000 <= len(generated("tussock-field", SEED).triangles) <= 27_000
 
 
 def test_changing_one_kind_leaves_the_others_where_they_are():
@@ -172,7 +174,7 @@ def test_vegetation_is_clustered_more_than_chance(preset):
 
 def test_most_of_the_ground_is_open():
     positions = np.random.default_rng(0).uniform(0.0, 10.0, (1500, 2))
-    assert 0.1 < (clearance(generated("tussock-field", 3), positions) < 0.04).mean() < 0.3
+    assert 0.1 < (clearance(generated("tussock-field", SEED), positions) < 0.04).mean() < 0.3
 
 
 def test_the_skyline_differs_around_the_field():
@@ -185,10 +187,10 @@ def test_the_skyline_differs_around_the_field():
 
 
 def test_origin_makes_the_world_again():
-    world = generated("meadow", 3)
+    world = generated("meadow", SEED)
     origin = json.loads(json.dumps(world.origin))
     assert origin == world.origin
-    assert (origin["preset"], origin["seed"]) == ("meadow", 3)
+    assert (origin["preset"], origin["seed"]) == ("meadow", SEED)
     again = WorldParams(**origin["params"])
     assert again == PRESETS["meadow"]
     small = generated("tiny", 3).origin
@@ -443,7 +445,7 @@ def test_the_cheapest_path_is_that_of_a_search_in_the_whole_field(preset):
     ],
 )
 def test_a_route_is_smooth_and_clear_of_obstacles(preset, seed):
-    world = generated(preset, 3)
+    world = generated(preset, SEED)
     route = generate_route(world, seed)
     wanted = 8.0 if preset != "tiny" else 0.8 * np.hypot(3, 3)
     assert route.length == pytest.approx(wanted, rel=0.1)
@@ -465,7 +467,7 @@ def test_routes_differ_and_have_corners():
 
 
 def test_a_route_has_the_requested_length():
-    assert generate_route(generated("tussock-field", 3), 0, length=3.0).length == pytest.approx(3.0, rel=0.02)
+    assert generate_route(generated("tussock-field", SEED), 0, length=3.0).length == pytest.approx(3.0, rel=0.02)
 
 
 def test_a_world_without_room_is_refused():
