@@ -626,7 +626,7 @@ def test_the_models_are_listed_without_torch():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     models = json.loads(done.stdout)["models"]
-    assert set(MODELS.names) <= set(models)
+    assert {name for name in MODELS.names if ":" not in name} <= set(models)  # other tests found some by their location
     for name in MODELS.builtin:
         cls = MODELS.find(name)
         assert models[name]["paper"] == cls.paper
