@@ -5,6 +5,7 @@ import io
 import itertools
 import json
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -101,6 +102,12 @@ def test_the_table_has_one_row_per_run_in_the_order_of_the_settings(swept):
     assert rows["error"].isna().all()
     assert rows["arrived"].mean() > 0.5
     assert (rows["reason"] == "arrived").tolist() == rows["arrived"].tolist()
+
+
+def test_every_column_of_the_table_is_explained(swept):
+    pages = "".join((Path(__file__).parents[1] / "docs" / f"{name}.md").read_text() for name in ("sweeps", "trajectory"))
+    results = set(table(swept).columns) - set(TYPES)
+    assert [name for name in results if not re.search(rf"^\| .*`{name}`.* \|", pages, re.MULTILINE)] == []
 
 
 def test_the_command_of_a_row_repeats_its_run_alone(capfd, swept, tmp_path, monkeypatch):
