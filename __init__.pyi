@@ -52,8 +52,11 @@ from .navigation import training_poses as training_poses
 from .navigation import translational as translational
 from .navigation import write_sweep_report as write_sweep_report
 from .render import Eye as Eye
+from .render import Ommatidia as Ommatidia
 from .render import Posture as Posture
 from .render import Renderer as Renderer
+from .render import compound_eye as compound_eye
+from .render import draw_ommatidia as draw_ommatidia
 from .render import open_renderer as open_renderer
 from .world import Bounds as Bounds
 from .world import DiskFullError as DiskFullError

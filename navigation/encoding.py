@@ -10,23 +10,21 @@ from typing import Any
 import attrs
 import numpy as np
 import torch
-from jaxtyping import Bool, Float32
+from jaxtyping import Float32
 
 from tussock.render.eye import Eye
-from tussock.render.images.source import DatabaseViews
-from tussock.render.poses import Poses
-from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.registry import Registry, suggestion
 from tussock.world.specs import signature_of
 
+from .encoding_ommatidia import SeenByOmmatidia
 from .encoding_rounding import Round
 from .encoding_steps import STEPS as BUILTIN
-from .encoding_steps import Blur, EncodingStep, ForegroundMask, Images, Normalise, Resize, Scale, Views, Visible
+from .encoding_steps import Blur, EncodingStep, Images, Normalise, Resize, Scale, Views, Visible
 from .encoding_steps_colour import COLOUR_STEPS
 from .encoding_steps_published import STEPS as PUBLISHED
+from .eye_encoding import EyeEncoding
 from .feature_mask import FeatureMask
-from .overlap import remark_on_overlap
 
 STEPS = Registry(
     "encodings",
@@ -105,29 +103,49 @@ class Encoding:
 
     def for_eye(self, eye: Eye) -> "EyeEncoding":
         """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
+        if eye.compound is not None:
+            return self._for_ommatidia(eye)
         known = eye.known
         one_column = any(getattr(step, "shows_one_column", False) for step in self.steps)
         visible = eye.visible() if eye.masked or known is not None or one_column else None
         if visible is None or (visible.all() and known is None and not one_column):
             return EyeEncoding(self, None)
+        local, normalised, gain = self._without_normalise()
+        chain = attrs.evolve(self, steps=local, rounded=not normalised)
+        visible = chain.visible(visible)
+        if not visible.any() or (known is not None and not chain.visible(known.visible()).any()):
+            raise SettingError(
+                f"encoding {str(self)!r} leaves no pixel that is made of visible ones alone; give less blur or resize, or a wider field"
+            )
+        partial = known is not None
+        mask = FeatureMask(torch.from_numpy(visible), normalised=normalised, gain=gain, partial=partial)
+        return EyeEncoding(chain, mask, known.visible() if partial else None)
+
+    def _for_ommatidia(self, eye: Eye) -> "EyeEncoding":
+        """For a compound eye: all steps before the normalisation are of the panorama that its ommatidia look at."""
+        local, normalised, gain = self._without_normalise()
+        shape, _, _ = attrs.evolve(self, steps=local).bounds(eye.height, eye.width)
+        if shape != (eye.height, eye.width):
+            raise SettingError(
+                f"encoding {str(self)!r} makes another size of views, but the ommatidia of an eye are what reduces them; leave resize out"
+            )
+        step = SeenByOmmatidia(eye)
+        visible = step.visible(eye.visible())
+        chain = attrs.evolve(self, steps=(*local, step), rounded=not normalised)
+        return EyeEncoding(chain, FeatureMask(torch.from_numpy(visible), normalised=normalised, gain=gain))
+
+    def _without_normalise(self) -> tuple[tuple[EncodingStep, ...], bool, float]:
+        """The steps before normalise, whether there is one, and the factor by which its result is scaled. Raises SettingError."""
         at = next((place for place, step in enumerate(self.steps) if isinstance(step, Normalise)), len(self.steps))
-        local, rest = self.steps[:at], self.steps[at + 1 :]
+        rest = self.steps[at + 1 :]
         for step in rest:
             if not isinstance(step, Scale):
                 raise SettingError(
                     f"encoding {str(self)!r}: with a field or mask, normalise takes what is visible at each heading, so it stands last, "
                     f"or before scale only; put {label(step)} before it"
                 )
-        chain = attrs.evolve(self, steps=local, rounded=at == len(self.steps))
-        visible = chain.visible(visible)
-        if not visible.any() or (known is not None and not chain.visible(known.visible()).any()):
-            raise SettingError(
-                f"encoding {str(self)!r} leaves no pixel that is made of visible ones alone; give less blur or resize, or a wider field"
-            )
         gain = float(np.prod([step.factor for step in rest if isinstance(step, Scale)]))
-        partial = known is not None
-        mask = FeatureMask(torch.from_numpy(visible), normalised=at < len(self.steps), gain=gain, partial=partial)
-        return EyeEncoding(chain, mask, known.visible() if partial else None)
+        return self.steps[:at], at < len(self.steps), gain
 
     def visible(self, mask: Visible) -> Visible:
         """Which pixels of a feature image are made of visible ones (height, width) alone. Raises SettingError where that is not known."""
@@ -192,69 +210,14 @@ class Encoding:
         return cls.parse(name)
 
 
-@attrs.frozen
-class EyeEncoding:
-    """An encoding for the views of one eye.
-
-    With a field of view or a mask it encodes the full circle, and leaves it to the model to hide what the eye does not see at each
-    rotation, and to normalise what it sees (`Model.see`).
-
-    Attributes:
-        encoding: What is made of the full circle.
-        mask: What of it the model sees; None where nothing is hidden.
-        known: (height, width) What an image shows of the world, as it was recorded; None where that is all of it.
-    """
-
-    encoding: Encoding
-    mask: FeatureMask | None
-    known: Visible | None = attrs.field(default=None, eq=attrs.cmp_using(eq=np.array_equal))
-
-    def at(self, renderer: Renderer, poses: Poses) -> Float32[torch.Tensor, "n h w"]:
-        """Feature images of what a renderer, or image databases, show at poses."""
-        return self(renderer.render(poses), renderer.known(poses) if isinstance(renderer, DatabaseViews) else None)
-
-    def __call__(
-        self, views: Views, known: Bool[np.ndarray, "n height width"] | None = None
-    ) -> Float32[torch.Tensor, "n h w"]:
-        """Feature images of the full circle, nan where they are not made of what is known.
-
-        Args:
-            views: (n, height, width, 3 or 4)
-            known: What each view shows of the world; None: as it was recorded.
-        """
-        estimates = views.shape[-1] == 3 and isinstance(self.encoding.steps[0], ForegroundMask)
-        if self.mask is not None and estimates:
-            raise SettingError(
-                "foreground-mask estimates the sky from the whole view, hidden parts too; with a field or mask give views with alpha, or "
-                "take grey"
-            )
-        images = self.encoding(views)
-        if self.known is None:
-            return images
-        for image, each in zip(images, [self.known] * len(views) if known is None else known, strict=True):
-            image[torch.from_numpy(~self.encoding.visible(each))] = torch.nan
-        return images
-
-    def remark_on_overlap(self) -> None:
-        """Log at how many rotations two images show too little of the same to be compared, if there are any."""
-        if self.known is not None and self.mask is not None:
-            shown = self.encoding.visible(self.known)
-            remark_on_overlap(shown & self.mask.visible.numpy(), shown)
-
-    def seen(self, views: Views) -> Float32[torch.Tensor, "n h w"]:
-        """Feature images as the eye sees them at its present heading, 0 where it sees nothing: not to be turned (`FeatureMask.images`)."""
-        images = self(views)
-        return images if self.mask is None else self.mask.images(images)
-
-
 def label(step: Any) -> str:
     """The name of a step in a chain."""
     return STEPS.name_of(type(step))
 
 
 def automatic_resize(eye: Eye) -> float:
-    """The factor by which a preset encoding reduces the views of an eye."""
-    return max(1.0, eye.width / FINE_WIDTH)
+    """The factor by which a preset encoding reduces the views of an eye; the ommatidia of a compound eye reduce them themselves."""
+    return 1.0 if eye.compound is not None else max(1.0, eye.width / FINE_WIDTH)
 
 
 def describe_encoding(encoding: Encoding, eye: Eye) -> tuple[str, float | None, float]:

@@ -41,7 +41,7 @@ ROUTE_SETTINGS = (
     "grid_database",
 )  # decide world and route
 VIEW_SETTINGS = (  # decide with these the views that are learned
-    "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "mask", "threads",
+    "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "side", "overlap_deg", "mask", "eye", "threads",
     "gaze", "body_length_m", "pitch_noise_deg", "roll_noise_deg",
     "encoding", "resize", "blur", "spacing_m", "every", "learning_walk_m", "parallel_views",
     "goal_walk_m", "goal_turns", "goal_views", "goal_spread_deg", "goal_only",
@@ -141,6 +141,8 @@ def _deciding(experiment: Experiment) -> dict[str, Any]:
     kept["navigator"] = _in_files(experiment.navigator, NAVIGATORS)
     if experiment.eye.mask is not None:
         kept["mask"] = str(experiment.eye.mask)  # its pixels, wherever they were read from
+    if experiment.eye.compound is not None:
+        kept["eye"] = str(experiment.eye.compound)  # likewise
     if experiment.route is not None:
         kept |= {"route": content_of(experiment.route), "route_seed": None, "route_length_m": None}
     databases = {name: getattr(experiment, name) for name in ("route_database", "grid_database")}

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from tussock.render.compound import as_compound
 from tussock.render.eye import Eye
 from tussock.render.posture import Posture
 from tussock.world.errors import SettingError
@@ -82,6 +83,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
         "world": None if databases else label_of(experiment.world, "world"),
         "size": f"{eye.width}x{eye.height}",
         "mask": None if eye.mask is None else eye.mask.source or str(eye.mask),
+        "eye": None if eye.compound is None else eye.compound.source or str(eye.compound),
         "route": None if experiment.route is None else label_of(experiment.route, "route"),
         "encoding": encoding,
         "resize": resize,
@@ -156,8 +158,13 @@ def _check_databases(given: Mapping[str, Any]) -> None:
 def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings) -> Eye:
     size = given.get("size") or (f"{known.width}x{known.height}" if known is not None else None)
     pixels = {} if size is None else dict(zip(("width", "height"), width_and_height(size), strict=True))
-    fields = pixels if known is None else pixels | {"field": known.field, "mask": known.mask, "known": known.known}
+    kept = ("field", "side", "overlap", "mask", "known", "compound")
+    fields: dict[str, Any] = {**pixels} if known is None else pixels | {name: getattr(known, name) for name in kept}
     fields |= fields_of(given, "eye")
+    if fields.get("compound") is not None:
+        fields["compound"] = as_compound(fields["compound"])
+        if surroundings.route_database is None:
+            fields = fields["compound"].panorama() | fields
     if surroundings.route_database is None:
         eye = Eye(**fields)
     else:
@@ -167,7 +174,8 @@ def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings
     if known is not None and eye != known:
         raise SettingError(
             f"{given['model']} learned through another eye ({known}) than is asked for ({eye}); "
-            "give the same --size, --samples, --eye-height-m, --top-deg, --bottom-deg, --field-deg and --mask, or none"
+            "give the same --size, --samples, --eye-height-m, --top-deg, --bottom-deg, --eye, --side, --overlap-deg, "
+            "--field-deg and --mask, or none"
         )
     return eye
 

@@ -105,7 +105,9 @@ def test_the_table_has_one_row_per_run_in_the_order_of_the_settings(swept):
 
 
 def test_every_column_of_the_table_is_explained(swept):
-    pages = "".join((Path(__file__).parents[1] / "docs" / f"{name}.md").read_text() for name in ("sweeps", "trajectory"))
+    pages = "".join(
+        (Path(__file__).parents[1] / "docs" / f"{name}.md").read_text() for name in ("sweeps", "trajectory")
+    )
     results = set(table(swept).columns) - set(TYPES)
     assert [name for name in results if not re.search(rf"^\| .*`{name}`.* \|", pages, re.MULTILINE)] == []
 

@@ -117,8 +117,15 @@ class ViewOptions(MeshOptions):
     """Elevation of its lower edge. Default: -15, or that of image databases."""
     field_deg: float | None = None
     """Horizontal field of view, centred ahead; the rest of the circle is hidden from the model. Default: 360, or the model file's."""
+    side: Annotated[str | None, tyro.conf.arg(metavar="both|left|right")] = None
+    """left: only what the left eye sees, from ahead over the left to behind. right: likewise. Default: both, or the model file's."""
+    overlap_deg: float | None = None
+    """Width of what both eyes see ahead, for --side; negative: of a gap between them. Default: 0, or the model file's."""
     mask: str | None = None
     """A picture of what the eye sees of the panorama: white where it sees, black where it does not. Default: all, or the model file's."""
+    eye: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")] = None
+    """A compound eye: ant, bee, 'fly ommatidia=700', 'sphere ommatidia=1000', or a file (.eye or .csv). Default: every pixel of the
+    panorama, or the model file's."""
     cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
     gaze: Annotated[str, tyro.conf.arg(metavar="level|body")] = default(Posture, "gaze")

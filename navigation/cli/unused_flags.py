@@ -21,6 +21,7 @@ _NEEDED = {
     "waypoint_m": "on_lost",
     "put_back_ahead_m": "on_lost",
     "body_length_m": "gaze",
+    "overlap_deg": "side",
 }
 _OF_THE_ROUTE = ("spacing_m", "every", "parallel_views", "learning_walk_m")  # what --goal-only makes useless
 

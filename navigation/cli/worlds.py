@@ -86,7 +86,13 @@ class ViewCommand(ViewOptions):
             view = renderer.render(self._tilted(renderer, np.array([[x, y, math.radians(heading_deg)]])))[0]
             backend = renderer.backend
         message(f"renderer: {backend}")
-        if surroundings.eye.masked:
+        if surroundings.eye.compound is not None:
+            from tussock.render.ommatidia_picture import draw_ommatidia
+
+            count = len(surroundings.eye.compound.ommatidia().azimuth)
+            message(f"each facet is what one of {count:,} ommatidia sees; black: none looks there")
+            view = draw_ommatidia(view, surroundings.eye)
+        elif surroundings.eye.masked:
             hidden, shown_as = 1 - surroundings.eye.visible().mean(), "transparent" if self.alpha else "black"
             message(f"{shown_as}: what the eye does not see, {hidden:.0%} of the panorama")
             view = surroundings.eye.hide(view[None])[0]

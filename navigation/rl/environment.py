@@ -194,8 +194,9 @@ def _spaces(task: RouteTask) -> tuple[Box, Box]:
     if task.chain is None:
         seen = Box(0, 255, (eye.height, eye.width, 3), np.uint8)
     else:
-        shape, low, high = task.chain.bounds(eye.height, eye.width)
-        if eye.masked:  # 0 where nothing is seen
+        shape, _, _ = task.chain.for_eye(eye).encoding.bounds(eye.height, eye.width)
+        _, low, high = task.chain.bounds(eye.height, eye.width)
+        if eye.masked or eye.compound is not None:  # 0 where nothing is seen
             low, high = min(low, 0.0), max(high, 0.0)
         margin = ROUNDING * max([1.0, *(abs(end) for end in (low, high) if np.isfinite(end))])
         seen = Box(low - margin, high + margin, shape, np.float32)

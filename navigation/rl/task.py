@@ -98,6 +98,8 @@ class RouteTask:
         if self.offset >= self.lost:
             raise SettingError(f"an offset of {self.offset} m; give less than {self.lost} m, which is lost")
         _ = self.experiment, self.chain  # refuses what they refuse
+        if self.eye.compound is not None and self.chain is None:
+            raise SettingError("what the ommatidia of an eye see is an encoding; give one, such as grey")
 
     @cached_property
     def experiment(self) -> Experiment:

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
+from tussock.render.compound import SUFFIXES
 from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.params import is_generated
 
@@ -182,7 +183,9 @@ class _Reader:
             return str((self.path.parent / value).resolve())
         if name == "model" and value.endswith(MODEL_SUFFIX):
             return str((self.path.parent / value).resolve())
-        if name == "mask" and ":" not in value:  # otherwise its pixels
+        if name == "eye" and Path(value).suffix.lower() not in SUFFIXES:
+            return value
+        if name in ("mask", "eye") and ":" not in value:  # otherwise its pixels or its ommatidia
             return str((self.path.parent / value).resolve())
         if Path in kinds:
             return (self.path.parent / value).resolve()
