@@ -5,6 +5,7 @@ from pathlib import Path
 
 import comparison
 import eyes
+import ommatidia
 import pictures
 import processors
 import protocols
@@ -60,6 +61,7 @@ MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
     comparison.MEASUREMENTS
     | eyes.MEASUREMENTS
+    | ommatidia.MEASUREMENTS
     | pictures.MEASUREMENTS
     | processors.MEASUREMENTS
     | protocols.MEASUREMENTS
