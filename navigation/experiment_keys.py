@@ -30,6 +30,7 @@ ROUTE_SETTINGS = (
     "strict",
     "ground",
     "max_slope_deg",
+    "altitude_m",
     "cull_back_faces",
     "route",
     "route_seed",

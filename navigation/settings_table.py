@@ -21,6 +21,7 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "strict": (bool, "reading.strict"),
     "ground": (str, "ground"),
     "max_slope_deg": (float, "max_slope"),
+    "altitude_m": (float | None, "altitude"),
     "seed": (int, "seed"),
     "size": (str | None, ""),
     "renderer": (str, "renderer"),

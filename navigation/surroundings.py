@@ -4,7 +4,7 @@ import dataclasses
 import logging
 import math
 import os
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,26 +16,29 @@ from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.meshes.reading import MeshReading
-from tussock.world.settings import choice, instance_of, number, refuse, settings, switch, text, whole
+from tussock.world.settings import MAX_COORDINATE, choice, instance_of, number, refuse, settings, switch, text, whole
 
 if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import Float
 
     from tussock.render.renderer import Renderer
+    from tussock.world.flight import Flight
     from tussock.world.geometry import Route
     from tussock.world.scene import World
 
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Surroundings")
 
-GROUNDS = ("flat", "mesh")
+GROUNDS = ("flat", "mesh", "route")
+LOW = 0.05  # m; what is lower counts as walked
 OF_WORLDS = (
     "world",
     "world_seed",
     "reading",
     "ground",
     "max_slope",
+    "altitude",
     "cull_back_faces",
     "route",
     "route_seed",
@@ -99,8 +102,10 @@ class Surroundings:
         world: A preset's name (parameters may follow it), a file, or a `World`.
         world_seed: Of a generated world; None means `seed`.
         reading: How the file of a world is read: its axis that is up, its unit, and whether losses are refused.
-        ground: "flat": agents stand at z = 0. "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`).
+        ground: "flat": agents stand at z = 0. "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`). "route":
+            they fly, at the heights of the route (`Route.heights`): everywhere at that of its nearest point.
         max_slope: Steepest ground of a mesh that can be stood and walked on (rad).
+        altitude: Height over z = 0 at which they fly, as that of their eye (m); None: as `ground` says.
         cull_back_faces: Triangles are seen from their front only, as the original Sussex renderer did.
         route: A `Route`, its file, or None to generate one. It may be in the coordinates of the world's file; see `World.origin_m`.
         route_seed: Of a generated route; None means `seed`.
@@ -123,6 +128,7 @@ class Surroundings:
     reading: MeshReading = instance_of(MeshReading, attrs.Factory(MeshReading), "a MeshReading")
     ground: str = choice("flat", GROUNDS)
     max_slope: float = number(math.radians(45.0), low=math.radians(1.0), high=math.radians(89.0), unit="rad")
+    altitude: float | None = number(None, low=-MAX_COORDINATE, high=MAX_COORDINATE, unit="m", optional=True)
     cull_back_faces: bool = switch(False)
     route: Any = attrs.field(default=None, converter=_route)
     route_seed: int | None = whole(None, low=0, optional=True)
@@ -145,6 +151,10 @@ class Surroundings:
         if self.eye.known is not None:
             raise SettingError(
                 "an eye's known pixels are of recorded images, and a world is drawn all around; give mask instead"
+            )
+        if self.altitude is not None and self.ground != "flat":
+            raise SettingError(
+                f"agents fly at an altitude of {self.altitude:g} m, or as ground {self.ground!r} says: give one of the two"
             )
         if isinstance(self.world, str):
             from tussock.world.files import check_world
@@ -204,9 +214,26 @@ class Surroundings:
         world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
         if self.ground == "mesh":
             return world.on_mesh(self.max_slope)
+        if self.ground == "route" or self.altitude is not None:
+            return world.flown(self._flight(world))
         if isinstance(self.world, str) and not is_generated(self.world):
             remark_on_ground(world, self.world, self.eye.z)
         return world
+
+    def _flight(self, world: "World") -> "Flight":
+        """Where agents fly, below their eye. Raises SettingError where the route has no heights."""
+        import numpy as np
+
+        from tussock.world.flight import Flight
+
+        if self.altitude is not None:
+            return Flight.at(self.altitude - self.eye.z)
+        route = self._given_route(world)
+        if route is None or route.heights is None:
+            raise SettingError(
+                "ground route flies at the heights of a route: give a route with a column z_m, or an altitude instead"
+            )
+        return Flight(np.column_stack([route.xy, route.heights - self.eye.z]))
 
     def open_route(self, world: "World") -> "Route":
         """The route through the world, or that of the database. Raises InputError where it leaves the world, or where none is found."""
@@ -214,22 +241,35 @@ class Surroundings:
             from tussock.render.images.folders import route_of
 
             return route_of(self.route_database, self.headings)
-        from tussock.world.geometry import Route
-        from tussock.world.origin import local_route
-        from tussock.world.route_files import read_route
         from tussock.world.routes import check_route, generate_route
 
-        seed = self.seed if self.route_seed is None else self.route_seed
-        if self.route is None:
-            route = generate_route(world, seed, self.route_length)
-        else:
-            read = (self.headings, self.columns, self.smooth)
-            route = self.route if isinstance(self.route, Route) else read_route(self.route, *read)
-            route = local_route(
-                world, route, "the route" if isinstance(self.route, Route) else f"the route {self.route}"
+        route = self._given_route(world)
+        if route is None:
+            route = generate_route(world, self.seed if self.route_seed is None else self.route_seed, self.route_length)
+        elif route.heights is not None and world.terrain is None and (high := abs(route.heights).max()) > LOW:
+            log.warning(
+                "the route is up to %.3g m high, and agents stay on the ground: give --ground route to fly at its heights",
+                high,
             )
         check_route(world, route)
         return route
+
+    def _given_route(self, world: "World") -> "Route | None":
+        """The route that was given, in the world's own coordinates; None where it is to be generated."""
+        from tussock.world.geometry import Route
+        from tussock.world.origin import local_route
+
+        if self.route is None:
+            return None
+        route = self.route if isinstance(self.route, Route) else self._read_route
+        return local_route(world, route, "the route" if route is self.route else f"the route {self.route}")
+
+    @cached_property
+    def _read_route(self) -> "Route":
+        """The route of the file: read once, so that what is remarked of it is said once."""
+        from tussock.world.route_files import read_route
+
+        return read_route(self.route, self.headings, self.columns, self.smooth)
 
     def open_world_and_route(self) -> "tuple[World, Route]":
         """The world, and the route through it."""

@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Bool, Float32, UInt8
 
 from tussock.world.errors import SettingError
+from tussock.world.flight import Flight
 from tussock.world.geometry import Pose, place_text, wrap_angle
 from tussock.world.scene import World
 from tussock.world.terrain import Terrain
@@ -173,7 +174,7 @@ class Walker:
                 self.walked = 0.0
         self.height = height
 
-    def _obstacle(self, terrain: Terrain, before: Pose, rise: float) -> StopReason | None:
+    def _obstacle(self, terrain: Terrain | Flight, before: Pose, rise: float) -> StopReason | None:
         """Why the step from a pose to the present one, which rises by some metres, cannot be made; None where it can."""
         x, y, _ = self.pose
         if not self.walk.world.field.contains(x, y):

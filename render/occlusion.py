@@ -49,7 +49,7 @@ def covered_within(world: World, eye: Eye, poses: AnyPoses, distance: float) -> 
 def _is_object(world: World, index: Int64[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
     """Whether triangles, by their index among the surfaces of a world, are not of its ground."""
     own = index >= len(world.triangles)
-    return ~own if world.terrain is None else ~own & ~world.terrain.is_ground[index]
+    return ~own if world.terrain is None else ~own & ~world.terrain.consists_of(index)
 
 
 def _covered(

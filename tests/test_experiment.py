@@ -278,7 +278,7 @@ def test_what_makes_no_sense_is_refused_where_the_experiment_is_made(settings, w
 
 OTHER: dict[str, Any] = {
     "world": "meadow", "world_seed": 5, "up": "y", "unit": "mm", "scale": 0.5, "strict": True,
-    "ground": "mesh", "max_slope_deg": 30.0,
+    "ground": "mesh", "max_slope_deg": 30.0, "altitude_m": 0.5,
     "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
     "top_deg": 50.0, "bottom_deg": -20.0, "field_deg": 270.0,
     "side": "left", "overlap_deg": 20.0, "eye": "ant", "mask": "mask.png", "cull_back_faces": True,

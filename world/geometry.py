@@ -144,9 +144,12 @@ class Route:
     Attributes:
         poses: (n, 3) x (m), y (m) and heading (rad, wrapped) of each point. At least 2 points, within MAX_COORDINATE. Of
             consecutive points at the same position the first is kept.
+        heights: (n,) Height of the eye over z = 0 at each point (m), of a path that is flown; None where that is not known. A route
+            that is made of this one has none.
     """
 
     poses: Float[np.ndarray, "n 3"]
+    heights: Float[np.ndarray, " n"] | None = None
 
     def __post_init__(self):
         poses = np.array(self.poses, dtype=np.float64)
@@ -164,12 +167,23 @@ class Route:
             raise SettingError(f"a route needs at least 2 distinct points, got {len(poses)}")
         poses[:, 2] = wrap_angle(poses[:, 2])
         object.__setattr__(self, "poses", poses)
+        if self.heights is not None:
+            heights = np.array(self.heights, dtype=np.float64)
+            if heights.shape != keep.shape or not (np.abs(heights) <= MAX_COORDINATE).all():
+                raise SettingError(f"heights of a route are {len(keep)} finite numbers up to {MAX_COORDINATE:g} (m)")
+            object.__setattr__(self, "heights", heights[keep])
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Route) and np.array_equal(self.poses, other.poses)
+        return isinstance(other, Route) and self._numbers == other._numbers
 
     def __hash__(self) -> int:
-        return hash(self.poses.tobytes())
+        return hash(self._numbers)
+
+    @property
+    def _numbers(self) -> tuple[bytes | None, ...]:
+        return tuple(
+            None if each is None else (each + 0.0).tobytes() for each in (self.poses, self.heights)
+        )  # of -0.0 as of 0.0
 
     @classmethod
     def through(cls, xy: Float[np.ndarray, "n 2"]) -> "Route":

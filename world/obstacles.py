@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
+from .flight import Flight
 from .scene import World, once_per_world
 from .terrain import STEP_HEIGHT, Terrain
 
@@ -112,13 +113,13 @@ def footprints(world: World) -> Float[np.ndarray, "n 6 2"]:
     return np.stack([first, last], axis=2).reshape(-1, 6, 2)
 
 
-def _above_ground(triangles: Float[np.ndarray, "n 3 3"], terrain: Terrain) -> Float[np.ndarray, "m 3 3"]:
+def _above_ground(triangles: Float[np.ndarray, "n 3 3"], terrain: Terrain | Flight) -> Float[np.ndarray, "m 3 3"]:
     """Those triangles that are not ground, with the heights of their corners above the ground there.
 
     A corner off the ground takes the lowest ground under the others. A triangle that is off the ground altogether is left out:
     nothing can walk there.
     """
-    others = triangles[~terrain.is_ground[: len(triangles)]].astype(np.float64)
+    others = triangles[~terrain.consists_of(np.arange(len(triangles)))].astype(np.float64)
     ground = terrain.height(others[..., :2].reshape(-1, 2)).reshape(-1, 3)
     lowest = np.fmin.reduce(ground, axis=1)
     others[..., 2] -= np.where(np.isnan(ground), lowest[:, None], ground)

@@ -63,7 +63,10 @@ def local_route(world: "World", route: "Route", what: str) -> "Route":
     from .geometry import Route
 
     xy = local_xy(world, route.xy, what)
-    return route if np.array_equal(xy, route.xy) else Route(np.column_stack([xy, route.poses[:, 2]]))
+    if np.array_equal(xy, route.xy):
+        return route
+    heights = None if route.heights is None else route.heights - world.origin_m[2]
+    return Route(np.column_stack([xy, route.poses[:, 2]]), heights)
 
 
 def shown(place: Iterable[float]) -> str:

@@ -76,7 +76,7 @@ def _route(path: Path, points: Points, headings: str, smooth: float) -> Route:
             "%s has no headings, and --headings %s does nothing: each point faces the next one", path, headings
         )
     if points.heading is None or headings == "path":
-        return Route(np.column_stack([xy, path_directions(xy)]))
+        return Route(np.column_stack([xy, path_directions(xy)]), points.heights)
     read_as = "bearing" if points.bearing else "ccw"
     poses = np.column_stack([points.xy, heading])
     if points.radians:
@@ -87,7 +87,7 @@ def _route(path: Path, points: Points, headings: str, smooth: float) -> Route:
         poses, read_as = convert(poses, headings), headings
     if headings != "as-is":
         _check_headings(path, diagnose(poses, read_as), points.planes, chosen=headings != "auto")
-    return Route(np.column_stack([xy, poses[:, 2]]))
+    return Route(np.column_stack([xy, poses[:, 2]]), points.heights)
 
 
 def _check_headings(path: Path, diagnosis: Diagnosis, planes: bool, chosen: bool) -> None:
@@ -145,13 +145,14 @@ def _remark_positions(path: Path, points: Points, route: Route, smooth: float) -
 
 
 def write_route(route: Route, path: str | os.PathLike) -> None:
-    """Write a route as CSV (x_m, y_m, heading_deg)."""
+    """Write a route as CSV (x_m, y_m, heading_deg; and z_m where its heights are known)."""
     if Path(path).suffix.lower() != ".csv":
         raise FileError(f"{path}: a route is written as .csv")
-    rows = np.column_stack([route.xy, np.degrees(route.poses[:, 2])]).tolist()
+    heights = [] if route.heights is None else [route.heights]
+    rows = np.column_stack([route.xy, np.degrees(route.poses[:, 2]), *heights]).tolist()
     with replacing(path) as partial, partial.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
+        writer.writerow((*COLUMNS, *("z_m",) * len(heights)))
         writer.writerows(rows)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from .errors import FileError, SettingError
 from .file_kinds import kind_of, looks_like_both, looks_like_world
@@ -43,6 +43,7 @@ class Points:
         unstated: Names of the columns whose unit is not stated: they were taken to be metres.
         planes: Whether the file is an AntWorld .bin.
         gaps: Lines without a position, which are left out.
+        heights: Numbers of a column z (m), where each point has one; else None.
     """
 
     xy: Float[np.ndarray, "n 2"]
@@ -52,6 +53,7 @@ class Points:
     unstated: str = ""
     planes: bool = False
     gaps: list[int] = field(default_factory=list)
+    heights: Float[np.ndarray, " n"] | None = None
 
 
 def read_points(path: Path, columns: str | None) -> Points:
@@ -108,7 +110,21 @@ def _of_text(text: str, columns: str | None) -> Points:
         raise FileError(f"line {table.lines[row]}: {table.refused(row, index, column)}{more}")
     points = _of_columns({axis: column for axis, (_, column) in found.items()}, values[:, ~lost])
     points.gaps = [table.lines[row] for row in np.flatnonzero(lost)]
+    points.heights = _heights(table, ~lost)
     return points
+
+
+def _heights(table: TextTable, kept: Bool[np.ndarray, " n"]) -> Float[np.ndarray, " m"] | None:
+    """The column z (m) of the rows that are kept, where each has a number."""
+    names = table.names or []
+    if (index := find_height(names)) is None:
+        return None
+    try:
+        column = chosen_column(names[index], "y")
+        heights = column.factor * table.column(index, column)[kept]
+    except FileError:  # in pixels, say: then it is no height
+        return None
+    return heights if np.isfinite(heights).all() else None
 
 
 def _yaw(x, y, z, w) -> Float[np.ndarray, " n"]:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
 from .errors import SettingError
+from .flight import Flight
 from .generate import GENERATOR, generate_plants
 from .geometry import Bounds
 from .params import WORLDS, WorldParams, preset_of
@@ -67,7 +68,7 @@ class World:
         origin_m: What was subtracted from the coordinates of the file (m): they are those of the world plus this.
         texturing: Textures and corner colours of the triangles, or None. `rgb` is then the mean colour of each triangle, which
             maps and recordings show; the renderers draw the texturing.
-        terrain: The ground of the mesh, which agents stand on (see `on_mesh`); None: they stand at z = 0.
+        terrain: The ground of the mesh, which agents stand on (see `on_mesh`), or where they fly; None: they stand at z = 0.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -79,7 +80,7 @@ class World:
     origin: dict[str, Any] = dataclasses.field(default_factory=dict)
     origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     texturing: Texturing | None = None
-    terrain: Terrain | None = None
+    terrain: Terrain | Flight | None = None
 
     def __post_init__(self):
         n = len(self.triangles)
@@ -146,8 +147,12 @@ class World:
         terrain = Terrain.of(self.surfaces()[0], float(np.prod(self.field.size)), max_slope)
         return dataclasses.replace(self, terrain=terrain)
 
+    def flown(self, flight: Flight) -> "World":
+        """The same world, where agents fly: they move on a surface in the air, and pass over and under what it does not cross."""
+        return dataclasses.replace(self, terrain=flight)
+
     def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
-        """Height of the ground at positions (both m): 0, or that of the terrain, where there is one; nan where it has no ground."""
+        """Height of what agents stand or fly on at positions (both m): 0, or that of the terrain; nan where it has no ground."""
         return np.zeros(len(xy)) if self.terrain is None else self.terrain.height(xy)
 
     def stands(self, xy: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:

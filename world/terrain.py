@@ -109,6 +109,10 @@ class Terrain:
             np.maximum.at(highest, row * len(x) + column, np.where(np.isnan(height), -np.inf, height))
         return np.where(np.isneginf(highest), np.nan, highest).reshape(len(y), len(x))
 
+    def consists_of(self, index: Int64[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
+        """Whether triangles, by their index, are ground."""
+        return self.is_ground[index]
+
     def is_too_steep(self, distance, rise):
         """Whether the ground is too steep between points some distance apart (m, over the x-y plane) that rises so much (m).
 

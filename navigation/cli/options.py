@@ -97,10 +97,13 @@ class ViewOptions(MeshOptions):
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = default(Surroundings, "world")
     world_seed: int | None = None
     """Seed of a generated world. Default: --seed."""
-    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = default(Surroundings, "ground")
-    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md)."""
+    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh|route")] = default(Surroundings, "ground")
+    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md). route: it flies at
+    the heights of the route's points (column z_m)."""
     max_slope_deg: float = degrees(default(Surroundings, "max_slope"))
     """Steepest ground of a mesh that can be stood and walked on."""
+    altitude_m: float | None = None
+    """Fly: the height of the eye over z = 0. Default: as --ground says."""
     seed: int = default(Surroundings, "seed")
     """Seed of everything random: the world and route where they are generated, the model's start, the heading noise."""
     size: str | None = None
