@@ -23,19 +23,26 @@ from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import Blur, EncodingStep, Images, Normalise, Resize, Scale, Views, Visible
 from .encoding_steps_colour import COLOUR_STEPS
 from .encoding_steps_published import STEPS as PUBLISHED
+from .encoding_steps_ultraviolet import REFLECTANCE, ULTRAVIOLET_STEPS
 from .eye_encoding import EyeEncoding
 from .feature_mask import FeatureMask
 
 STEPS = Registry(
     "encodings",
     "encoding step",
-    {step.name: f"{step.__module__}:{step.__qualname__}" for step in (*BUILTIN, *PUBLISHED, *COLOUR_STEPS)},
+    {
+        step.name: f"{step.__module__}:{step.__qualname__}"
+        for step in (*BUILTIN, *PUBLISHED, *COLOUR_STEPS, *ULTRAVIOLET_STEPS)
+    },
 )
 OLD_NAMES = {"sky-mask": "foreground-mask"}  # of steps; files and people may still use them
 PRESETS = {
     "grey": "grey | {blur}{resize}",
     "sky": "foreground-mask | {blur}{resize}normalise",
     "edges": "foreground-mask | {blur}vertical-edges | {resize}normalise",
+    "green": "green-channel | {blur}{resize}",
+    "uv": f"ultraviolet {REFLECTANCE} | {{blur}}{{resize}}",
+    "uv-green": f"ultraviolet-green {REFLECTANCE} | {{blur}}{{resize}}",
 }
 FINE_WIDTH = 120  # columns that a preset encoding reduces wider views to
 BATCH_PIXELS = 108_000  # of views that are encoded at once: they stay in the processor's cache through all steps

@@ -28,11 +28,13 @@ class EncodingStep(ABC):
     Attributes:
         name: Of a step of tussock, in a chain. A step from outside is named where it is registered.
         takes_views: It begins a chain: it takes panoramas (n, height, width, 3 or 4) uint8. All other steps take images.
+        estimates_sky: It estimates the sky from the whole view, where views have no alpha.
         takes_unit_range: It takes values from 0 to 1 only, so it cannot follow `Normalise`.
     """
 
     name: ClassVar[str] = ""
     takes_views: ClassVar[bool] = False
+    estimates_sky: ClassVar[bool] = False
     takes_unit_range: ClassVar[bool] = False
 
     @abstractmethod
@@ -94,6 +96,7 @@ class ForegroundMask(PixelStep):
 
     name: ClassVar[str] = "foreground-mask"
     takes_views: ClassVar[bool] = True
+    estimates_sky: ClassVar[bool] = True
 
     def __call__(self, images: Views) -> Images:
         if images.shape[-1] == 4:

@@ -12,7 +12,7 @@ from tussock.render.poses import Poses
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 
-from .encoding_steps import ForegroundMask, Views, Visible
+from .encoding_steps import Views, Visible
 from .feature_mask import FeatureMask
 from .overlap import remark_on_overlap
 
@@ -50,10 +50,10 @@ class EyeEncoding:
             views: (n, height, width, 3 or 4)
             known: What each view shows of the world; None: as it was recorded.
         """
-        estimates = views.shape[-1] == 3 and isinstance(self.encoding.steps[0], ForegroundMask)
-        if self.mask is not None and estimates:
+        first = self.encoding.steps[0]
+        if self.mask is not None and views.shape[-1] == 3 and getattr(first, "estimates_sky", False):
             raise SettingError(
-                "foreground-mask estimates the sky from the whole view, hidden parts too; with a field or mask give views with alpha, or "
+                f"{first.name} estimates the sky from the whole view, hidden parts too; with a field or mask give views with alpha, or "
                 "take grey"
             )
         images = self.encoding(views)

@@ -11,6 +11,7 @@ from tussock.navigation import encoding_rounding
 from tussock.navigation.block_means import block_means
 from tussock.navigation.encoding import PRESETS, Encoding
 from tussock.navigation.encoding_steps import Clahe, Grey, Normalise
+from tussock.navigation.experiment import Experiment
 from tussock.navigation.models import PerfectMemory
 from tussock.render.eye import Eye
 from tussock.render.renderer import open_renderer
@@ -215,7 +216,7 @@ def test_presets_are_chains(name, views):
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("edge", ("'edge'", "grey, sky, edges")),
+        ("edge", ("'edge'", "grey, sky, edges, green, uv, uv-green")),
         ("blur 2 | grey", ("'blur'", "after one that takes views")),
         ("grey | sharpen", ("'sharpen'", "blur, resize", "package.module:Class")),
         ("grey | grey", ("'grey'", "at the beginning only")),
@@ -396,3 +397,32 @@ def test_an_invalid_chain_as_published_is_refused(text, parts):
 def test_views_that_are_too_small_for_a_chain_as_published_are_refused(text, message):
     with pytest.raises(SettingError, match=message):
         Encoding.parse(text)(np.zeros((1, 48, 120, 4), np.uint8))
+
+
+# Green and ultraviolet
+
+
+def test_the_ultraviolet_is_bright_in_the_sky_and_dark_elsewhere(views):
+    covered = views[..., 3] / 255
+    seen = Encoding.parse("ultraviolet 0.1 | scale 1")(views).numpy()
+    assert np.abs(seen - (1 - 0.9 * covered)).max() < 2e-4
+    green = Encoding.parse("green-channel | scale 1")(views).numpy()
+    assert np.abs(green - views[..., 1] / 255).max() < 2e-4
+    contrast = Encoding.parse("ultraviolet-green 0.1 | scale 1")(views).numpy()
+    u, g = 1 - 0.9 * covered, views[..., 1] / 255
+    assert np.abs(contrast - (u - g) / (u + g)).max() < 2e-4
+    both = Encoding.parse("ultraviolet-and-green 0.1 | scale 1")(views).numpy()
+    assert np.array_equal(both, np.concatenate([seen, green], axis=1))
+
+
+def test_the_contrast_of_black_is_0_and_not_nan():
+    black = np.zeros((1, 4, 8, 4), np.uint8)
+    black[..., 3] = 255
+    assert (Encoding.parse("ultraviolet-green 0 | scale 1")(black).numpy() == 0).all()
+
+
+def test_a_walk_by_ultraviolet_arrives():
+    for encoding in ("uv", "uv-green", "ultraviolet-and-green 0.05 | resize 3"):
+        eye = Eye(width=180, height=40)
+        walk = Experiment(world="tiny", seed=3, route_length=1.0, eye=eye, encoding=encoding).run().summary()
+        assert walk["arrived"], encoding

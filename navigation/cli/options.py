@@ -181,7 +181,7 @@ class SourceOptions(RouteOptions):
     grid_database: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Image database of the views around that route: what is seen at a position is the image taken nearest to it."""
     encoding: str | None = None
-    """edges (the default), grey or sky; or a chain of steps, such as 'foreground-mask | vertical-edges | resize 6 | normalise'."""
+    """edges (the default), grey, sky, green, uv or uv-green; or a chain, such as 'foreground-mask | vertical-edges | resize 6'."""
     resize: float | None = None
     """Factor by which a view's width and height are reduced. Default: so that the width is 120."""
     blur: float = 0.0

@@ -1,0 +1,92 @@
+"""Steps of encodings for what insects see in green and in ultraviolet.
+
+In the ultraviolet the sky is bright and the ground is dark, plants and soil alike, in any weather: a tenth of the light or less comes back
+from them. So the skyline is where the ultraviolet drops (Moeller 2002; Differt and Moeller 2015). Worlds have no colours in the
+ultraviolet. Here the open sky is 1, and all else reflects one share of it.
+"""
+
+from typing import ClassVar
+
+import attrs
+import numpy as np
+from jaxtyping import Float32
+
+from tussock.world.settings import number
+
+from .encoding_steps import EncodingStep, ForegroundMask, Images, PixelStep, Views, Visible
+
+REFLECTANCE = 0.05  # of foliage and soil in the ultraviolet, about, in the presets
+
+
+@attrs.frozen
+class GreenChannel(PixelStep):
+    """What green receptors see: the green channel, 0..1."""
+
+    name: ClassVar[str] = "green-channel"
+    takes_views: ClassVar[bool] = True
+
+    def __call__(self, images: Views) -> Images:
+        return images[..., 1] * np.float32(1 / 255)
+
+
+@attrs.frozen
+class Ultraviolet(PixelStep):
+    """What ultraviolet receptors see, 0..1: open sky is 1, and all else is dark. The sky is found as `foreground-mask` finds it.
+
+    Attributes:
+        reflectance: Of all that is not sky.
+    """
+
+    name: ClassVar[str] = "ultraviolet"
+    takes_views: ClassVar[bool] = True
+    estimates_sky: ClassVar[bool] = True
+    reflectance: float = number(low=0, high=1)
+
+    def __call__(self, images: Views) -> Images:
+        return 1 - np.float32(1 - self.reflectance) * ForegroundMask()(images)
+
+
+@attrs.frozen
+class UltravioletGreen(PixelStep):
+    """The contrast of ultraviolet and green, (u - g) / (u + g), -1..1: it stays as it is when the light grows brighter or dimmer.
+
+    Attributes:
+        reflectance: As of `Ultraviolet`.
+    """
+
+    name: ClassVar[str] = "ultraviolet-green"
+    takes_views: ClassVar[bool] = True
+    estimates_sky: ClassVar[bool] = True
+    reflectance: float = number(low=0, high=1)
+
+    def __call__(self, images: Views) -> Images:
+        ultraviolet, green = Ultraviolet(self.reflectance)(images), GreenChannel()(images)
+        total = ultraviolet + green
+        return np.divide(ultraviolet - green, total, out=np.zeros_like(total), where=total > 0)
+
+    def bounds(self, low: float, high: float, pixels: int) -> tuple[float, float]:
+        return -1.0, 1.0
+
+
+@attrs.frozen
+class UltravioletAndGreen(EncodingStep):
+    """Both channels, 0..1: the ultraviolet plane above the green one. Models learn them as one image of twice the rows.
+
+    Attributes:
+        reflectance: As of `Ultraviolet`.
+    """
+
+    name: ClassVar[str] = "ultraviolet-and-green"
+    takes_views: ClassVar[bool] = True
+    estimates_sky: ClassVar[bool] = True
+    reflectance: float = number(low=0, high=1)
+
+    def __call__(self, images: Views) -> Float32[np.ndarray, "n both_planes w"]:
+        return np.concatenate([Ultraviolet(self.reflectance)(images), GreenChannel()(images)], axis=1)
+
+    def visible(self, mask: Visible) -> Visible:
+        """The same pixels, in both planes."""
+        return np.concatenate([mask, mask])
+
+
+ULTRAVIOLET_STEPS = (GreenChannel, Ultraviolet, UltravioletGreen, UltravioletAndGreen)
