@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 import worlds
 
-from tussock.render import Eye, open_renderer
+from tussock.navigation import Encoding
+from tussock.render import Eye, compound_eye, open_renderer
 from tussock.render.images.writing import Grid, published_grid_area, write_database
+from tussock.render.ommatidia import named_eye
 from tussock.world import InputError
 
 SHAPES = [(720, 150, 1), (90, 25, 4), (90, 25, 1), (120, 25, 4)]
@@ -59,6 +61,32 @@ def test_view_with_and_without_textures(measure, what):
         measure(
             f"view 720 x 150, {name} {what}, in batches",
             lambda: renderer.render(poses),
+            items=32,
+            unit="ms a view",
+        )
+
+
+def test_view_of_a_tilted_eye(measure):
+    name, world = worlds.everyday()
+    poses = np.column_stack([worlds.poses_in(world, 32), np.full(32, 0.05), np.radians([[15, -10]] * 32)])
+    with open_renderer(world, Eye(), "cpu") as renderer:
+        measure(
+            f"view 720 x 150, {name}, pitched and rolled, in batches",
+            lambda: renderer.render(poses),
+            items=32,
+            unit="ms a view",
+        )
+
+
+@pytest.mark.parametrize("name", ["sphere ommatidia=1000", "ant"])
+def test_view_through_ommatidia(measure, name):
+    where, world = worlds.everyday()
+    poses, eye = worlds.poses_in(world, 32), compound_eye(name)
+    encoded = Encoding.named("grey").for_eye(eye)
+    with open_renderer(world, eye, "cpu") as renderer:
+        measure(
+            f"what {len(named_eye(name).azimuth):,} ommatidia see at all turns ({name.split()[0]}), {where}, in batches",
+            lambda: encoded(renderer.render(poses)),
             items=32,
             unit="ms a view",
         )

@@ -14,6 +14,7 @@ from tussock import (
     PerfectMemory,
     Recording,
     StoppingRules,
+    compound_eye,
     generate_route,
     make_model,
     open_renderer,
@@ -46,6 +47,28 @@ def test_walk(measure, agent):
         unit="steps a second",
         rounds=7,
     )
+
+
+@pytest.mark.parametrize("name", ["720 x 150", "left half", "ant", "sphere ommatidia=1000"])
+def test_walk_with_an_eye(measure, name):
+    eyes = {"720 x 150": Eye(), "left half": Eye(side="left")}
+    eye, (_, world) = eyes.get(name) or compound_eye(name), worlds.everyday()
+    route = generate_route(world, 1)
+    stopping = StoppingRules(max_steps=40, arrival_radius=0.01, max_deviation=9.0, patience=99.0)
+    with open_renderer(world, eye, "cpu") as renderer:
+        poses = training_poses(route, route.length / (SNAPSHOTS - 1))
+        encoding = Encoding.named("sky", resize=1 if eye.compound is not None else 6)
+        agent = Agent(
+            renderer=renderer, trained=train(PerfectMemory(), encoding, renderer, poses), route=route, stopping=stopping
+        )
+        steps = sum(1 for _ in agent.walk(agent.start()))
+        measure(
+            f"a step with the eye: {name}, {SNAPSHOTS} snapshots",
+            lambda: list(agent.walk(agent.start())),
+            items=steps,
+            unit="steps a second",
+            rounds=3,
+        )
 
 
 def test_recorded_walk(measure, agent, tmp_path):
