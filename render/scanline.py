@@ -28,7 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 
 from tussock.world.errors import InputError, SettingError
 from tussock.world.scene import World
@@ -100,6 +100,29 @@ class ScanlineRenderer:
             keys = np.empty((self.eye.width * self.eye.rays, self.eye.height * self.eye.rays), dtype=np.int64)
         draw_views(*self._scene, poses, frames, start, stop, keys, views.view("<u4")[..., 0])
         self._scratch.append(keys)  # fresh memory costs more than drawing a small view
+
+    def hits(self, poses: AnyPoses) -> tuple[Float[np.ndarray, "n height width"], Int64[np.ndarray, "n height width"]]:
+        """What each pixel shows, for an eye with one ray a pixel.
+
+        Returns:
+            How far away it is (m), inf for the sky; and which triangle of `World.surfaces` it is, -1 for the sky.
+        """
+        if self.eye.rays != 1:
+            raise SettingError(f"hits are of single rays, and this eye has {self.eye.rays} in a pixel; give samples=1")
+        eyes, (width, height) = poses_of_eye(self.world, self.eye, poses), (self.eye.width, self.eye.height)
+        keys, view = np.empty((width, height), dtype=np.int64), np.empty((1, height, width), dtype=np.uint32)
+        away, label = np.empty((len(eyes), height, width)), np.empty((len(eyes), height, width), dtype=np.int64)
+        for k in range(len(eyes)):
+            pose = eyes[k : k + 1]
+            draw_views(*self._scene, pose, frames_of(pose) if pose[0, 4:].any() else None, 0, width, keys, view)
+            nearness = (
+                (keys >> 32).astype(np.int32).view(np.float32)
+            )  # the inverse distance along the first two axes of the eye
+            with np.errstate(divide="ignore"):
+                away[k] = (1 / nearness / np.cos(self.eye.elevations())).T
+            label[k] = (keys & 0xFFFFFFFF).T
+        surfaces = len(self.world.surfaces()[0])
+        return away, np.where(label == 0, -1, surfaces - label)
 
     def close(self) -> None:
         """Stop the threads."""

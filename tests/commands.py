@@ -26,6 +26,7 @@ KEYS = {
     },
     "train": {"file", "model", "encoding", "n_views", "memory_bytes", "fit_seconds"},
     "compare": {"encoding", "n_views", "n_positions", "n_worlds", "n_walks", "models"},
+    "describe": {"world", "n_places", "measures", "skyline_spectrum", "contrast_spectrum", "figure"},
     "ridf": {"encoding", "n_references", "rotational", "translational", "figure"},
     "catchment": {
         "model", "encoding", "n_positions", "spacing_m", "area_m2", "volume", "reach_m", "descent_within_45", "descent_within_90",

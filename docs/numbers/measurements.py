@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import comparison
+import descriptions
 import eyes
 import ommatidia
 import pictures
@@ -60,6 +61,7 @@ NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in 
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
     comparison.MEASUREMENTS
+    | descriptions.MEASUREMENTS
     | eyes.MEASUREMENTS
     | ommatidia.MEASUREMENTS
     | pictures.MEASUREMENTS

@@ -13,6 +13,7 @@ GROUPS: dict[str, dict[str, Any]] = {
         "world": "worlds:WorldCommand",
         "view": "worlds:ViewCommand",
         "route": "worlds:RouteCommand",
+        "describe": "describe:DescribeCommand",
     },
     "Learn a route and walk it home": {
         "run": "models:RunCommand",

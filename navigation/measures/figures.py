@@ -3,15 +3,17 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from tussock.world.geometry import Pose, Route, turn_of_columns
+from tussock.world.geometry import Pose, Route, column_azimuths, turn_of_columns
 from tussock.world.scene import World
 
 from ..reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, canvas
 from ..reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from .catchment import Catchment, Landscape
+from .description import STEP, Description
 from .image_difference import Rotational, Translational
 from .place_recognition import PlaceRecognition
 
@@ -38,6 +40,43 @@ def difference_figure(rotations: Sequence[Rotational], translations: Mapping[str
     for each in (left, right):
         each.legend(frameon=False, fontsize="small")
     return figure
+
+
+def description_figure(found: Description) -> Figure:
+    """Skylines, spectra, and how the image difference grows with turns and with distance."""
+    figure, axes = canvas((9.0, 5.6), 2, 2)
+    (skylines, spectra), (turns, growth) = axes
+    azimuth = np.degrees(column_azimuths(found.skylines.shape[1]))
+    for line, colour in zip(found.skylines[:4], SHADES, strict=False):
+        skylines.plot(azimuth, line, color=colour, lw=1)
+    skylines.set(xlim=(180, -180), xticks=range(180, -181, -90), xlabel="degrees left of ahead", ylabel="skyline (deg)")
+    for label, power, colour in (
+        ("skyline (deg²)", found.skyline_power, ROUTE_COLOUR),
+        ("contrast", found.contrast_power, PATH_COLOUR),
+    ):
+        spectra.loglog(np.arange(1, power.shape[1] + 1), power.mean(axis=0), color=colour, lw=1.3, label=label)
+    spectra.set(xlabel="cycles around the circle", ylabel="power")
+    spectra.legend(frameon=False, fontsize="small")
+    angles = np.degrees(turn_of_columns(np.arange(found.rotation.shape[1]), found.rotation.shape[1]))
+    order = angles.argsort()
+    _spread(turns, angles[order], found.rotation[:, order])
+    turns.set(
+        xlim=(-180, 180), xticks=range(-180, 181, 90), xlabel="degrees of turn, 0.1 m apart", ylabel="image difference"
+    )
+    _spread(growth, STEP * np.arange(1, found.growth.shape[1] + 1), found.growth)
+    growth.set(xlim=(0, None), ylim=(0, None), xlabel="m away, at the same heading", ylabel="image difference")
+    return figure
+
+
+def _spread(axes: Axes, x: np.ndarray, curves: np.ndarray) -> None:
+    """The mean of curves, and the range of 90 % of them."""
+    low, middle, high = (
+        np.nanpercentile(curves, 5, axis=0),
+        np.nanmean(curves, axis=0),
+        np.nanpercentile(curves, 95, axis=0),
+    )
+    axes.fill_between(x, low, high, color=ROUTE_COLOUR, alpha=0.2, lw=0)
+    axes.plot(x, middle, color=ROUTE_COLOUR, lw=1.5)
 
 
 def catchment_figure(ground: Landscape, found: Catchment, around: Route | Pose, world: World | None) -> Figure:
