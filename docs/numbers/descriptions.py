@@ -26,7 +26,7 @@ def measure(folder: Path) -> Values:
 def described(folder: Path, world: str, seed: int) -> Values:
     """Means over places, and the slopes of the spectra."""
     result = tussock(folder, "describe", world, "--seed", seed, "--places", PLACES)
-    slopes = {name: result[f"{name}_spectrum"]["slope"] for name in ("skyline", "contrast")}
+    slopes = {f"{name}_slope": result[f"{name}_spectrum"]["slope"] for name in ("skyline", "contrast")}
     return {name: row["mean"] for name, row in result["measures"].items()} | slopes
 
 
@@ -39,7 +39,7 @@ def table(values: Values) -> str:
         return f"{mean:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
     rows = [[MEASURES[name], *(cell(name, each, digits) for each in values.values())] for name, digits in SHOWN.items()]
-    slopes = {"skyline": "skyline: exponent of its power", "contrast": "contrast: exponent of its power"}
+    slopes = {"skyline_slope": "skyline: exponent of its power", "contrast_slope": "contrast: exponent of its power"}
     rows += [[label, *(cell(name, each, 1) for each in values.values())] for name, label in slopes.items()]
     return markdown(["mean over places (range over seeds)", *values], rows)
 
