@@ -134,7 +134,8 @@ class Encoding:
         shape, _, _ = attrs.evolve(self, steps=local).bounds(eye.height, eye.width)
         if shape != (eye.height, eye.width):
             raise SettingError(
-                f"encoding {str(self)!r} makes another size of views, but the ommatidia of an eye are what reduces them; leave resize out"
+                f"encoding {str(self)!r} makes images of another size ({shape[1]}x{shape[0]}), but ommatidia look at all of a view: "
+                "leave resize out, and steps of several planes"
             )
         step = SeenByOmmatidia(eye)
         visible = step.visible(eye.visible())

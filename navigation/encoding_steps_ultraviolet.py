@@ -48,7 +48,7 @@ class Ultraviolet(PixelStep):
 
 @attrs.frozen
 class UltravioletGreen(PixelStep):
-    """The contrast of ultraviolet and green, (u - g) / (u + g), -1..1: it stays as it is when the light grows brighter or dimmer.
+    """The contrast of ultraviolet and green, (u - g) / (u + g), -1..1: outdoors it hardly changes as the light grows brighter or dimmer.
 
     Attributes:
         reflectance: As of `Ultraviolet`.
@@ -71,6 +71,8 @@ class UltravioletGreen(PixelStep):
 @attrs.frozen
 class UltravioletAndGreen(EncodingStep):
     """Both channels, 0..1: the ultraviolet plane above the green one. Models learn them as one image of twice the rows.
+
+    A blur, or a resize that does not divide the height, mixes them where they meet.
 
     Attributes:
         reflectance: As of `Ultraviolet`.

@@ -102,8 +102,11 @@ class Experiment(Surroundings):
                 raise SettingError(
                     f"the navigator {str(self.navigator)!r} lacks learn, begin or decide; name a class that has them"
                 )
-            if (self.eye.masked or self.eye.known is not None) and not takes(self.navigator.target, "model"):
-                raise SettingError(f"the navigator {str(self.navigator)!r} takes no model; give no field and no mask")
+            if not (self.eye.sees_all or takes(self.navigator.target, "model")):
+                raise SettingError(
+                    f"the navigator {str(self.navigator)!r} takes no model, so it would see all of a panorama: no field, side, mask or "
+                    "compound eye"
+                )
         elif not takes(self.navigator.target, "model"):
             raise SettingError(
                 f"the navigator {str(self.navigator)!r} takes no model, so it cannot use {self.model}; name another"

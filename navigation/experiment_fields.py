@@ -72,5 +72,9 @@ def check_start(experiment: Any) -> None:
         raise SettingError(
             f"--displace-m {carried:g} is farther than --lost-m {lost:g}, where every walk ends: give a larger --lost-m"
         )
+    if experiment.ground == "route" and experiment.body.collisions != "pass":
+        raise SettingError(
+            f"--collisions {experiment.body.collisions}: obstacles are known at one height; fly with --altitude-m, or leave it out"
+        )
     if experiment.route_database is not None and experiment.body.collisions != "pass":
         raise SettingError(f"--collisions {experiment.body.collisions}: images have no obstacles; leave it out")

@@ -53,8 +53,8 @@ class EyeEncoding:
         first = self.encoding.steps[0]
         if self.mask is not None and views.shape[-1] == 3 and getattr(first, "estimates_sky", False):
             raise SettingError(
-                f"{first.name} estimates the sky from the whole view, hidden parts too; with a field or mask give views with alpha, or "
-                "take grey"
+                f"{first.name} estimates the sky from the whole view, hidden parts too; with a field, side, mask "
+                "or compound eye give views with alpha, or take grey"
             )
         images = self.encoding(views)
         if self.known is None:

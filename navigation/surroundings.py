@@ -4,7 +4,7 @@ import dataclasses
 import logging
 import math
 import os
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -221,19 +221,23 @@ class Surroundings:
         return world
 
     def _flight(self, world: "World") -> "Flight":
-        """Where agents fly, below their eye. Raises SettingError where the route has no heights."""
+        """Where agents fly, below their eye. Raises SettingError where the route has no heights, or is under the ground."""
         import numpy as np
 
         from tussock.world.flight import Flight
 
         if self.altitude is not None:
-            return Flight.at(self.altitude - self.eye.z)
-        route = self._given_route(world)
-        if route is None or route.heights is None:
-            raise SettingError(
-                "ground route flies at the heights of a route: give a route with a column z_m, or an altitude instead"
-            )
-        return Flight(np.column_stack([route.xy, route.heights - self.eye.z]))
+            places = np.array([[0.0, 0.0, self.altitude]])
+        else:
+            route = self._given_route(world)
+            if route is None or route.heights is None:
+                raise SettingError(
+                    "ground route flies at the heights of a route: give one with a column z_m that has a number in each row, or an altitude"
+                )
+            places = np.column_stack([route.xy, route.heights])
+        if world.ground is not None and (low := places[:, 2].min()) <= 0:
+            raise SettingError(f"a flight at z = {low:g} m is under the ground of the world; give heights over 0")
+        return Flight(places - [0, 0, self.eye.z])
 
     def open_route(self, world: "World") -> "Route":
         """The route through the world, or that of the database. Raises InputError where it leaves the world, or where none is found."""
@@ -246,7 +250,12 @@ class Surroundings:
         route = self._given_route(world)
         if route is None:
             route = generate_route(world, self.seed if self.route_seed is None else self.route_seed, self.route_length)
-        elif route.heights is not None and world.terrain is None and (high := abs(route.heights).max()) > LOW:
+        elif (
+            route.heights is not None
+            and self.ground == "flat"
+            and self.altitude is None
+            and (high := abs(route.heights).max()) > LOW
+        ):
             log.warning(
                 "the route is up to %.3g m high, and agents stay on the ground: give --ground route to fly at its heights",
                 high,
@@ -258,18 +267,13 @@ class Surroundings:
         """The route that was given, in the world's own coordinates; None where it is to be generated."""
         from tussock.world.geometry import Route
         from tussock.world.origin import local_route
+        from tussock.world.route_files import read_route
 
         if self.route is None:
             return None
-        route = self.route if isinstance(self.route, Route) else self._read_route
+        read = (self.headings, self.columns, self.smooth)
+        route = self.route if isinstance(self.route, Route) else read_route(self.route, *read)
         return local_route(world, route, "the route" if route is self.route else f"the route {self.route}")
-
-    @cached_property
-    def _read_route(self) -> "Route":
-        """The route of the file: read once, so that what is remarked of it is said once."""
-        from tussock.world.route_files import read_route
-
-        return read_route(self.route, self.headings, self.columns, self.smooth)
 
     def open_world_and_route(self) -> "tuple[World, Route]":
         """The world, and the route through it."""

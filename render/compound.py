@@ -25,7 +25,7 @@ HEIGHT = 2.3548200450309493  # full width at half height of a Gaussian, in stand
 class CompoundEye(str):
     """The ommatidia of both eyes as a text: a name with its parameters ("ant", "fly ommatidia=300"), or "420 ommatidia:" and all angles.
 
-    Two are equal where the same ommatidia are meant, wherever they come from.
+    `as_compound` makes it. Two are equal where they have one name, or the same angles, wherever they come from.
 
     Attributes:
         source: The file that it was read from; None where it was not.
@@ -38,7 +38,16 @@ class CompoundEye(str):
         """The eye with these ommatidia."""
         import numpy as np
 
-        numbers = np.stack([np.asarray(each, np.float64) for each in ommatidia])
+        from .ommatidia import problem_of
+
+        arrays = [np.asarray(each, np.float64) for each in ommatidia]
+        if len({each.shape for each in arrays}) > 1 or arrays[0].ndim != 1 or not len(arrays[0]):
+            raise SettingError(
+                "each ommatidium of an eye has an azimuth, an elevation, an acceptance angle and a side; give (n,) arrays"
+            )
+        if (problem := problem_of(ommatidia)) is not None:
+            raise SettingError(f"ommatidium {problem[0]}: {problem[1]}")
+        numbers = np.stack(arrays)
         packed = base64.urlsafe_b64encode(zlib.compress(numbers.astype("<f8").tobytes(), 9)).decode()
         eye = cls(f"{len(ommatidia.azimuth)} ommatidia:{packed}")
         eye.source = source

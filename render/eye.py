@@ -121,6 +121,11 @@ class Eye:
         """Whether a field, a side or a mask is set."""
         return self.field < 2 * math.pi or self.side != "both" or self.mask is not None
 
+    @property
+    def sees_all(self) -> bool:
+        """Whether every pixel of a panorama is what it sees."""
+        return not self.masked and self.known is None and self.compound is None
+
     def visible(self) -> "Bool[np.ndarray, 'height width']":
         """Which pixels of a panorama the eye sees, wherever it faces."""
         import numpy as np
@@ -163,6 +168,7 @@ class Eye:
     def plain(self) -> dict[str, Any]:
         """Its fields by name, for files: numbers and texts. Where all is visible, nothing is said of that, as in earlier files."""
         fields = attrs.asdict(self)
+        fields["compound"] = None if self.compound is None else str(self.compound)  # plain, as other libraries write it
         sides = self.side != "both"
         said = {
             "side": sides,
@@ -170,8 +176,8 @@ class Eye:
             "field": self.masked,
             "mask": self.masked,
             "known": self.known is not None,
+            "compound": self.compound is not None,
         }
-        said["compound"] = self.compound is not None
         return {name: value for name, value in fields.items() if said.get(name, True)}
 
     def elevations(self, rays: int = 1) -> 'Float[np.ndarray, " height_rays"]':

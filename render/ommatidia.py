@@ -4,6 +4,7 @@ Azimuths are turns to the left of the direction ahead, elevations are over the h
 Gaussian at half its height, all in radians here and in degrees in names, tables and messages.
 """
 
+import csv
 import math
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -134,13 +135,17 @@ def read_eye(path: Path) -> Ommatidia:
     if len(lines) > MAX_OMMATIDIA:
         raise FileError(f"{path} has {len(lines)} lines; give at most {MAX_OMMATIDIA:,} ommatidia")
     found = _of_table(path, lines) if path.suffix.lower() == ".csv" else _of_eye_file(path, lines)
-    _check(path, found, [number for number, _ in lines][-len(found.azimuth) :])
+    if (problem := problem_of(found)) is not None:
+        which, words = problem
+        raise FileError(f"{path}, line {lines[which - len(found.azimuth)][0]}: {words}")
     return found
 
 
 def _of_eye_file(path: Path, lines: list[tuple[int, str]]) -> Ommatidia:
     rows = [_numbers(path, number, line.replace(",", " ").split(), 8) for number, line in lines]
     x, y, z, acceptance = np.array(rows)[:, 3:7].T
+    largest = np.maximum(np.abs([x, y, z]).max(axis=0), 1e-300)  # so that no square overflows
+    x, y, z = x / largest, y / largest, z / largest
     length = np.sqrt(x * x + y * y + z * z)
     if (bad := ~(length > 0)).any():
         raise FileError(f"{path}, line {lines[int(bad.argmax())][0]}: its direction is 0; give a vector")
@@ -148,19 +153,21 @@ def _of_eye_file(path: Path, lines: list[tuple[int, str]]) -> Ommatidia:
 
 
 def _of_table(path: Path, lines: list[tuple[int, str]]) -> Ommatidia:
-    names = [name.strip().lower() for name in lines[0][1].split(",")]
+    separator = ";" if ";" in lines[0][1] else ","
+    cells = [[cell.strip() for cell in row] for row in csv.reader([line for _, line in lines], delimiter=separator)]
+    names = [name.lower() for name in cells[0]]
     wanted = ["azimuth_deg", "elevation_deg", "acceptance_deg"]
-    if missing := [name for name in wanted if name not in names]:
-        raise FileError(
-            f"{path}, line {lines[0][0]}: no column {missing[0]}; the first line names azimuth_deg (to the left of ahead), elevation_deg, "
-            "acceptance_deg (full width at half height) and, if you like, side"
-        )
+    for name in wanted:
+        if names.count(name) != 1:
+            raise FileError(
+                f"{path}, line {lines[0][0]}: {'no' if name not in names else 'more than one'} column {name}; the first line names "
+                "azimuth_deg (to the left of ahead), elevation_deg, acceptance_deg (full width at half height) and, if you like, side"
+            )
     angles, sides = [], []
-    for number, line in lines[1:]:
-        cells = [cell.strip() for cell in line.split(",")]
-        if len(cells) != len(names):
-            raise FileError(f"{path}, line {number}: {len(cells)} values for {len(names)} columns")
-        given = dict(zip(names, cells, strict=True))
+    for (number, _), row in zip(lines[1:], cells[1:], strict=True):
+        if len(row) != len(names):
+            raise FileError(f"{path}, line {number}: {len(row)} values for {len(names)} columns")
+        given = dict(zip(names, row, strict=True))
         angles.append(_numbers(path, number, [given[name] for name in wanted], 3))
         side = given.get("side", "").lower()
         if side not in ("", "left", "right"):
@@ -186,18 +193,21 @@ def _numbers(path: Path, line: int, cells: list[str], count: int) -> list[float]
     return found
 
 
-def _check(path: Path, found: Ommatidia, numbers: list[int]) -> None:
-    """Refuse angles that no eye has."""
-    acceptance = np.degrees(found.acceptance)
-    limits = {
-        f"its acceptance angle is {{:g}} degrees; give {NARROWEST:g} to {WIDEST:g}": (acceptance, NARROWEST, WIDEST),
-        "its elevation is {:g} degrees; give -90 to 90": (np.degrees(found.elevation), -90, 90),
-        "its azimuth is {:g} degrees; give -360 to 360": (np.degrees(found.azimuth), -360, 360),
-    }
-    for problem, (angles, low, high) in limits.items():
-        if (bad := ~((angles >= low) & (angles <= high))).any():
+def problem_of(eyes: Ommatidia) -> tuple[int, str] | None:
+    """Which ommatidium cannot be, and what is wrong with it; None where all can be."""
+    limits = (
+        ("acceptance angle", eyes.acceptance, NARROWEST, WIDEST),
+        ("elevation", eyes.elevation, -90, 90),
+        ("azimuth", eyes.azimuth, -360, 360),
+    )
+    for name, radians, low, high in limits:
+        degrees = np.degrees(radians)
+        if (bad := ~((degrees >= low - 1e-9) & (degrees <= high + 1e-9))).any():  # ~: of nan as well
             worst = int(bad.argmax())
-            raise FileError(f"{path}, line {numbers[worst]}: {problem.format(angles[worst])}")
+            return worst, f"its {name} is {degrees[worst]:g} degrees; give {low:g} to {high:g}"
+    if (bad := ~np.isin(eyes.side, (LEFT, RIGHT, EITHER))).any():
+        return int(bad.argmax()), f"its side is {eyes.side[bad][0]}; give {LEFT} (left), {RIGHT} (right) or {EITHER}"
+    return None
 
 
 def _counted(name: str, ommatidia: int) -> int:

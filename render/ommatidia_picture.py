@@ -10,6 +10,7 @@ from .receptors import receptors_of
 
 WIDTH = 1440  # of a picture, in pixels
 CORNER = 0.7  # of the distance to its fifth neighbour, as far as a facet reaches; a hexagon's corner is at 0.577 of it
+FEW = 6  # ommatidia that have too few neighbours to be facets: each is a disc, as wide as its acceptance angle
 LINE = 0.7  # brightness at the edge of a facet
 NOWHERE = -1  # no ommatidium looks there
 
@@ -56,6 +57,9 @@ def _nearest(eyes: Ommatidia, side: int, pixels: Float[np.ndarray, "p 3"]) -> In
         return np.full(len(pixels), NOWHERE)
     directions = _directions(eyes.azimuth[these], eyes.elevation[these])
     tree = KDTree(directions)
+    if len(these) <= FEW:
+        distance, index = tree.query(pixels)
+        return np.where(distance <= eyes.acceptance[these][index] / 2, these[index], NOWHERE)
     apart = tree.query(directions, k=min(6, len(these)))[0].reshape(len(these), -1)[
         :, -1
     ]  # the nearest is the ommatidium itself

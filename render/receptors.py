@@ -11,12 +11,13 @@ where in it there are ommatidia. It turns with the eye as a panorama does, so mo
 (navigation/feature_mask.py).
 """
 
+import logging
 import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int64
+from jaxtyping import Bool, Float, Float32, Int64
 
 from tussock.world.errors import SettingError
 
@@ -24,6 +25,8 @@ from .compile import compiled
 from .compound import HEIGHT, REACH, TURNS
 from .eye import Eye
 
+log = logging.getLogger(__name__)
+COARSE = 3  # pixels in an acceptance angle, at least
 EQUAL = 9  # decimals (of degrees) to which directions are equal
 
 
@@ -69,6 +72,7 @@ def receptors_of(eye: Eye) -> Receptors:
     """The matrix of a compound eye. Raises SettingError where its panorama is too coarse for an ommatidium."""
     assert eye.compound is not None
     azimuth, elevation, acceptance, _ = eye.compound.ommatidia()
+    _remark_on_panorama(eye, elevation, acceptance)
     width = _turns(eye.width)
     place = (np.pi - azimuth) * width / (2 * np.pi) - 0.5
     off = np.round(place - np.rint(place), EQUAL)
@@ -85,6 +89,30 @@ def receptors_of(eye: Eye) -> Receptors:
     starts, step = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64), eye.width // width
     places = (rows * step + columns % step) * 2 * width + columns // step
     return Receptors(width, starts, places, weights.astype(np.float32), row.reshape(-1), column)
+
+
+def _remark_on_panorama(eye: Eye, elevation: Float[np.ndarray, " n"], acceptance: Float[np.ndarray, " n"]) -> None:
+    """Warn of a panorama that is too coarse for its ommatidia, or ends within what they see."""
+    pixel = max(2 * np.pi / eye.width, (eye.top - eye.bottom) / eye.height)
+    if pixel > acceptance.min() / COARSE:
+        log.warning(
+            "a pixel of the panorama is %.2g degrees wide, and the narrowest acceptance angle %.2g: what ommatidia see is imprecise; "
+            "give a larger size, or none",
+            *np.degrees([pixel, acceptance.min()]),
+        )
+    reach = acceptance / 2
+    low, high = max(eye.bottom, -np.pi / 2 + 1e-9), min(eye.top, np.pi / 2 - 1e-9)
+    cut = ((elevation + reach > high) & (eye.top < np.pi / 2 - 1e-9)) | (
+        (elevation - reach < low) & (eye.bottom > 1e-9 - np.pi / 2)
+    )
+    if cut.any():
+        log.warning(
+            "%d of %d ommatidia look at the edge of the panorama (%.3g to %.3g degrees), and see only what is inside; give wider edges, or "
+            "none",
+            cut.sum(),
+            len(cut),
+            *np.degrees([eye.bottom, eye.top]),
+        )
 
 
 def _turns(width: int) -> int:

@@ -23,6 +23,7 @@ from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.models.perfect_memory import PerfectMemory
 from tussock.render.compound import CompoundEye, as_compound
 from tussock.render.eye import Eye, compound_eye
+from tussock.render.images.writing import write_database
 from tussock.render.ommatidia import EYES, LEFT, RIGHT, Ommatidia, named_eye, read_eye
 from tussock.render.ommatidia_picture import draw_ommatidia
 from tussock.render.receptors import receptors_of
@@ -392,3 +393,60 @@ def test_image_databases_are_seen_through_ommatidia(tmp_path, capfd):
 
 def test_the_step_is_for_eyes_only():
     assert "|" not in str(SeenByOmmatidia(scattered(24, height=12)))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"acceptance": np.full(8, 3.7)}, "acceptance angle is 211"),
+        ({"azimuth": np.full(8, np.nan)}, "azimuth is nan"),
+        ({"elevation": np.full(8, 2.0)}, "elevation"),
+        ({"side": np.full(8, 7, np.int8)}, "side is 7"),
+        ({"side": np.zeros(3, np.int8)}, "arrays"),
+    ],
+)
+def test_ommatidia_that_cannot_be_are_refused(change, words):
+    with pytest.raises(SettingError, match=words):
+        CompoundEye.of(SCATTERED._replace(**change))
+
+
+def test_navigators_without_a_model_and_databases_refuse_a_compound_eye(tmp_path):
+    with pytest.raises(SettingError, match="compound eye"):
+        Experiment(world="tiny", eye=scattered(24, height=12), navigator="home-vector")
+    with (
+        open_renderer(random_world(1, 50), scattered(24, height=12), "cpu") as renderer,
+        pytest.raises(SettingError, match="no compound eye"),
+    ):
+        write_database(tmp_path / "d", renderer, random_poses(2))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_panorama_that_is_too_coarse_or_too_low_is_remarked(caplog):
+    receptors_of(compound_eye("ant", width=60, height=12))
+    assert "imprecise" in caplog.text
+    caplog.clear()
+    receptors_of(compound_eye("ant", top=math.radians(50)))
+    assert "look at the edge" in caplog.text
+    caplog.clear()
+    receptors_of(compound_eye("ant"))
+    receptors_of(compound_eye("fly ommatidia=50"))
+    assert caplog.text == ""
+
+
+def test_few_ommatidia_are_discs():
+    one = Ommatidia(np.zeros(1), np.zeros(1), np.full(1, math.radians(20)), np.zeros(1, np.int8))
+    eye = compound_eye(one, top=math.pi / 2, bottom=-math.pi / 2, width=120, height=60)
+    picture = draw_ommatidia(np.full((60, 120, 4), 200, np.uint8), eye)
+    shown = np.argwhere(picture[..., 3] > 0)
+    assert np.ptp(shown[:, 1]) == pytest.approx(1440 * 20 / 360, abs=3)
+    assert shown.mean(axis=0) == pytest.approx([360, 720], abs=2)
+
+
+def test_tables_in_quotes_and_with_semicolons(tmp_path):
+    (tmp_path / "a.csv").write_text('"azimuth_deg";"elevation_deg";"acceptance_deg"\n"10";"0";"5"\n')
+    assert np.degrees(read_eye(tmp_path / "a.csv").azimuth) == pytest.approx([10])
+    (tmp_path / "a.csv").write_text("azimuth_deg,azimuth_deg,elevation_deg,acceptance_deg\n1,2,3,4\n")
+    with pytest.raises(FileError, match="more than one column azimuth_deg"):
+        read_eye(tmp_path / "a.csv")
+    (tmp_path / "a.eye").write_text("0 0 0 1e200 0 1e200 0.1 0\n")
+    assert np.degrees(read_eye(tmp_path / "a.eye").azimuth) == pytest.approx([-45])

@@ -12,6 +12,7 @@ from tussock.navigation.body import Body
 from tussock.navigation.cli.main import main
 from tussock.navigation.experiment import Experiment
 from tussock.render.eye import Eye
+from tussock.render.images.writing import write_database
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import open_renderer
 from tussock.world.errors import SettingError
@@ -73,10 +74,10 @@ def test_a_walk_flies_at_an_altitude_or_along_the_heights_of_its_route():
     assert climb.summary()["arrived"]
     expected = 0.2 + 0.4 * (np.array(climb.column("x_m")) + 0.5)
     assert np.abs(np.array(climb.column("z_m")) + SMALL.z - expected).max() < 0.02
-    assert (
-        Experiment(**common, route=climbing(), ground="route", body=Body(collisions="slide")).run().summary()["steps"]
-        > 3
-    )
+    slides = Experiment(**common, route=climbing(), altitude=0.4, body=Body(collisions="slide")).run()
+    assert slides.summary()["steps"] > 3
+    with pytest.raises(SettingError, match="obstacles are known at one height"):
+        Experiment(**common, route=climbing(), ground="route", body=Body(collisions="slide"))
 
 
 def test_routes_keep_their_heights_through_files(tmp_path):
@@ -135,3 +136,28 @@ def test_commands_fly(tmp_path, capfd):
         main(["run", "--world", "tiny", "--ground", "route", "--out", str(tmp_path / "no")])
     assert end.value.code == 2
     assert "column z_m" in capfd.readouterr().err
+
+
+def test_databases_in_flight_and_flights_under_the_ground_are_refused(tmp_path):
+    world = random_world(5, 100)
+    with (
+        open_renderer(world.flown(Flight.at(1.0)), SMALL, "cpu") as renderer,
+        pytest.raises(SettingError, match="one height"),
+    ):
+        write_database(tmp_path / "d", renderer, np.array([[0.0, 0.0, 0.0]]))
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(SettingError, match="under the ground"):
+        Experiment(world="tiny", altitude=-1.0).open_world()
+    low = Route(climbing().poses, climbing().heights - 0.3)
+    with pytest.raises(SettingError, match="under the ground"):
+        Experiment(world="tiny", route=low, ground="route").open_world()
+
+
+def test_a_route_is_read_again_when_its_file_changed(tmp_path):
+    write_route(climbing(), tmp_path / "r.csv")
+    experiment = Experiment(world=random_world(5, 100), route=tmp_path / "r.csv", ground="route")
+    before = len(pickle.dumps(experiment))
+    assert experiment.open_world_and_route()[1].heights == pytest.approx(climbing().heights)
+    write_route(Route(climbing().poses, climbing().heights + 1), tmp_path / "r.csv")
+    assert experiment.open_world_and_route()[1].heights == pytest.approx(climbing().heights + 1)
+    assert len(pickle.dumps(experiment)) == before

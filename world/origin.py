@@ -64,7 +64,7 @@ def local_route(world: "World", route: "Route", what: str) -> "Route":
 
     xy = local_xy(world, route.xy, what)
     if np.array_equal(xy, route.xy):
-        return route
+        return route  # in the world's own coordinates, its heights too
     heights = None if route.heights is None else route.heights - world.origin_m[2]
     return Route(np.column_stack([xy, route.poses[:, 2]]), heights)
 

@@ -21,6 +21,7 @@ from .route_columns import (
     refuse_several_tracks,
 )
 from .route_tables import TextTable, columns_of, decode, read_table
+from .settings import MAX_COORDINATE
 
 logger = logging.getLogger(__name__)
 
@@ -124,7 +125,7 @@ def _heights(table: TextTable, kept: Bool[np.ndarray, " n"]) -> Float[np.ndarray
         heights = column.factor * table.column(index, column)[kept]
     except FileError:  # in pixels, say: then it is no height
         return None
-    return heights if np.isfinite(heights).all() else None
+    return heights if (np.abs(heights) <= MAX_COORDINATE).all() else None  # False for nan
 
 
 def _yaw(x, y, z, w) -> Float[np.ndarray, " n"]:

@@ -97,9 +97,8 @@ class ViewOptions(MeshOptions):
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = default(Surroundings, "world")
     world_seed: int | None = None
     """Seed of a generated world. Default: --seed."""
-    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh|route")] = default(Surroundings, "ground")
-    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md). route: it flies at
-    the heights of the route's points (column z_m)."""
+    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = default(Surroundings, "ground")
+    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md)."""
     max_slope_deg: float = degrees(default(Surroundings, "max_slope"))
     """Steepest ground of a mesh that can be stood and walked on."""
     altitude_m: float | None = None
@@ -154,6 +153,9 @@ class ViewOptions(MeshOptions):
 class RouteOptions(ViewOptions):
     """What world is seen, through what eye, and a route through it."""
 
+    ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh|route")] = default(Surroundings, "ground")
+    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md). route: it flies at
+    the heights of the route's points (column z_m)."""
     route: Path | None = None
     """A route file (.csv, .txt, .mat, .npy or AntWorld .bin); without it one is generated."""
     route_seed: int | None = None

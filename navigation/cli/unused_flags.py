@@ -41,6 +41,9 @@ def unused_flags(experiment: Experiment) -> dict[str, str]:
     unused = {
         name: f"without {_flag(needed)}" for name, needed in _NEEDED.items() if name in given and needed not in given
     }
+    eye = experiment.eye
+    if "overlap_deg" in given and eye.compound is not None and eye.compound.ommatidia().side.all():
+        unused["overlap_deg"] = "with an eye whose ommatidia belong to a side"
     if experiment.training.goal_only:
         unused |= {name: "with --goal-only" for name in _OF_THE_ROUTE if name in given}
     navigator, name = experiment.navigator, str(experiment.navigator)

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.errors import SettingError
+from tussock.world.flight import Flight
 from tussock.world.geometry import Bounds
 from tussock.world.progress import Progress, printed
 from tussock.world.settings import MAX_COORDINATE, number, numbers, settings, wholes
@@ -99,6 +100,12 @@ def write_database(
     Raises:
         InputError: The folder holds anything else. Then nothing is changed.
     """
+    if isinstance(renderer.world.terrain, Flight):
+        raise SettingError(
+            "the images of a database are of one height above the ground; for a level in the air give the eye that height"
+        )
+    if renderer.eye.compound is not None:
+        raise SettingError("the images of a database are panoramas, which any eye looks at later; give no compound eye")
     progress = printed(progress, "drawing", "views")
     folder, grid = Path(folder), poses if isinstance(poses, Grid) else None
     stored = stored_poses(poses.poses() if isinstance(poses, Grid) else poses)
