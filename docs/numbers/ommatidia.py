@@ -48,7 +48,7 @@ def measure_eyes(folder: Path) -> Values:
 
 
 def measure_ommatidia(folder: Path) -> Values:
-    """Mean errors of headings (deg) beside routes in three worlds, and their figure."""
+    """Mean errors of headings (deg) beside routes in five worlds, and their figure."""
     grid = {
         model: {
             str(number): {
