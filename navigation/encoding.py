@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Float32
 
 from tussock.render.eye import Eye
+from tussock.render.receptors import receptors_of
 from tussock.world.errors import SettingError
 from tussock.world.registry import Registry, suggestion
 from tussock.world.specs import signature_of
@@ -137,9 +138,8 @@ class Encoding:
                 f"encoding {str(self)!r} makes images of another size ({shape[1]}x{shape[0]}), but ommatidia look at all of a view: "
                 "leave resize out, and steps of several planes"
             )
-        step = SeenByOmmatidia(eye)
-        visible = step.visible(eye.visible())
-        chain = attrs.evolve(self, steps=(*local, step), rounded=not normalised)
+        visible = receptors_of(eye).visible(eye.ommatidia_in_field())
+        chain = attrs.evolve(self, steps=(*local, SeenByOmmatidia(eye)), rounded=not normalised)
         return EyeEncoding(chain, FeatureMask(torch.from_numpy(visible), normalised=normalised, gain=gain))
 
     def _without_normalise(self) -> tuple[tuple[EncodingStep, ...], bool, float]:

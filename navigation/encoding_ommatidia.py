@@ -2,17 +2,17 @@
 
 import attrs
 import numpy as np
-from jaxtyping import Bool, Float32
+from jaxtyping import Float32
 
 from tussock.render.eye import Eye
 from tussock.render.receptors import receptors_of
 
-from .encoding_steps import EncodingStep, Images, Visible
+from .encoding_steps import EncodingStep, Images
 
 
 @attrs.frozen
 class SeenByOmmatidia(EncodingStep):
-    """What the ommatidia of an eye see at all turns, as an image (see `Receptors`). It is no step of a chain that people write.
+    """What the ommatidia of an eye see at all turns, as an image (see `Receptors`). People do not write it in a chain.
 
     Attributes:
         eye: A compound eye.
@@ -22,7 +22,3 @@ class SeenByOmmatidia(EncodingStep):
 
     def __call__(self, images: Images) -> Float32[np.ndarray, "n rows turns"]:
         return receptors_of(self.eye).images(images)
-
-    def visible(self, mask: Visible) -> Bool[np.ndarray, "rows turns"]:
-        """Where ommatidia are."""
-        return receptors_of(self.eye).visible(self.eye.ommatidia_in_field())

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import math
 import os
 import re
 import zlib
@@ -19,7 +20,7 @@ SUFFIXES = (".eye", ".csv")  # of files
 FINE = 6  # pixels in the acceptance angle of the panorama from which ommatidia are computed, at least
 TURNS = 120  # of an eye, at least, where its panorama has as many columns
 REACH = 4  # standard deviations up to which a Gaussian is summed
-HEIGHT = 2.3548200450309493  # full width at half height of a Gaussian, in standard deviations
+FWHM = 2.3548200450309493  # full width at half maximum of a Gaussian, in standard deviations
 
 
 class CompoundEye(str):
@@ -59,13 +60,11 @@ class CompoundEye(str):
 
     def panorama(self) -> dict[str, Any]:
         """The size, the edges and the samples of a panorama that holds all that it sees, as fields of an `Eye`."""
-        import math
-
         import numpy as np
 
         _, elevation, acceptance, _ = self.ommatidia()
         width = TURNS * math.ceil(2 * math.pi * FINE / float(acceptance.min()) / TURNS)
-        spread = REACH / HEIGHT * acceptance
+        spread = REACH / FWHM * acceptance
         top, bottom = np.degrees([(elevation + spread).max(), (elevation - spread).min()])
         top, bottom = min(90, math.ceil(top)), max(-90, math.floor(bottom))
         height = math.ceil((top - bottom) * width / 360)

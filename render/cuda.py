@@ -93,10 +93,8 @@ class CudaRenderer:
         cuda, threads, n, (*_, columns, rows) = self._cuda, self._threads, len(eyes), self._numbers
         frames, tilted = np.empty((0, 4, 3)), bool(eyes[:, 4:].any())
         if tilted:
-            frames, eyes = (
-                frames_of(eyes),
-                eyes * [1, 1, 0, 1, 0, 0],
-            )  # in its own frame an eye faces along the first axis
+            frames = frames_of(eyes)
+            eyes = eyes * [1, 1, 0, 1, 0, 0]  # in its own frame an eye faces along the first axis
         (narrow, wide), average = drawing_kernels(self._textured, tilted), averaging_kernel(self._textured, tilted)
         directions = np.empty((n, 2, columns))
         for heading, of_view in zip(eyes[:, 2], directions, strict=True):

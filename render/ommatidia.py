@@ -19,7 +19,7 @@ from tussock.world.registry import suggestion
 from tussock.world.specs import Spec, parse_spec
 
 MAX_OMMATIDIA = 100_000
-FACETS = 5_000  # at most, where a number is asked for: each row of an image has those that look equally high
+MAX_ASKED = 5_000  # at most, where a number is asked for: each row of an image has those that look equally high
 NARROWEST, WIDEST = 0.2, 90.0  # acceptance angles (deg)
 LEFT, RIGHT, EITHER = 1, -1, 0  # sides
 STEP_DEG = 0.5  # to which the azimuths of the eyes here are rounded: so few rows of an image hold them all
@@ -126,7 +126,7 @@ def read_eye(path: Path) -> Ommatidia:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
-        raise FileError(f"there is no eye {str(path)!r}; give a name ({', '.join(EYES)}) or a file") from error
+        raise FileError(f"the eye {str(path)!r} was not found; give a name ({', '.join(EYES)}) or a file") from error
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{path} cannot be read as an eye ({error}); give .eye or .csv") from error
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
@@ -211,8 +211,8 @@ def problem_of(eyes: Ommatidia) -> tuple[int, str] | None:
 
 
 def _counted(name: str, ommatidia: int) -> int:
-    if isinstance(ommatidia, bool) or not isinstance(ommatidia, int) or not 10 <= ommatidia <= FACETS:
-        raise SettingError(f"eye {name}: ommatidia is {ommatidia!r}; give a whole number from 10 to {FACETS}")
+    if isinstance(ommatidia, bool) or not isinstance(ommatidia, int) or not 10 <= ommatidia <= MAX_ASKED:
+        raise SettingError(f"eye {name}: ommatidia is {ommatidia!r}; give a whole number from 10 to {MAX_ASKED}")
     return ommatidia
 
 

@@ -60,9 +60,7 @@ def _nearest(eyes: Ommatidia, side: int, pixels: Float[np.ndarray, "p 3"]) -> In
     if len(these) <= FEW:
         distance, index = tree.query(pixels)
         return np.where(distance <= eyes.acceptance[these][index] / 2, these[index], NOWHERE)
-    apart = tree.query(directions, k=min(6, len(these)))[0].reshape(len(these), -1)[
-        :, -1
-    ]  # the nearest is the ommatidium itself
+    apart = tree.query(directions, k=6)[0][:, -1]  # the nearest is the ommatidium itself
     distance, index = tree.query(pixels)
     return np.where(distance <= CORNER * apart[index], these[index], NOWHERE)
 

@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float, Float32, Int64
 from tussock.world.errors import SettingError
 
 from .compile import compiled
-from .compound import HEIGHT, REACH, TURNS
+from .compound import FWHM, REACH, TURNS
 from .eye import Eye
 
 log = logging.getLogger(__name__)
@@ -124,7 +124,7 @@ def _entries(eye: Eye, width: int, elevation: float, acceptance: float, shift: f
     """Rows, columns and weights of the pixels that an ommatidium sees which looks at a place of the first column of the image."""
     azimuth = np.pi - (0.5 + shift) * 2 * np.pi / width
     heights, turns = eye.elevations(), np.pi - (np.arange(eye.width) + 0.5) * 2 * np.pi / eye.width
-    deviation = acceptance / HEIGHT
+    deviation = acceptance / FWHM
     # |p - o|^2 = 4 sin^2(d / 2), by differences of angles, which round less than a product of vectors does.
     half = np.sin((heights - elevation) / 2)[:, None] ** 2
     half = half + np.cos(elevation) * np.cos(heights)[:, None] * np.sin((turns - azimuth) / 2) ** 2

@@ -108,7 +108,7 @@ def test_what_reads_the_output_may_have_enough_of_it():
 
 
 def test_the_names_of_several_models_are_not_taken_for_one(capfd, tmp_path):
-    """`all` is no model, but the test bed takes it; what follows is refused for another reason."""
+    """`all` names all models, which only the test bed takes; what follows is refused for another reason."""
     code, _, err = tussock(capfd, "benchmark", "--model", "all", "--quick", "--encoding", "nonsense", "--out", tmp_path)
     assert code == 2
     assert "nonsense" in err

@@ -16,7 +16,6 @@ from test_fields import NAMES, by_brute_force
 
 from tussock.navigation.cli.main import main
 from tussock.navigation.encoding import Encoding
-from tussock.navigation.encoding_ommatidia import SeenByOmmatidia
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.experiment_settings import experiment_of, run_command
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
@@ -267,7 +266,7 @@ def test_a_text_holds_an_eye(tmp_path):
         ({"compound": "antt"}, ["did you mean 'ant'"]),
         ({"compound": "fly ommatidia=5"}, ["10 to 5000"]),
         ({"compound": "fly facets=50"}, ["facets"]),
-        ({"compound": "no.eye"}, ["there is no eye 'no.eye'"]),
+        ({"compound": "no.eye"}, ["the eye 'no.eye' was not found"]),
         ({"compound": 3}, ["3", "file"]),
         ({"compound": "ant", "mask": np.ones((150, 720), bool)}, ["no mask"]),
         ({"compound": "ant", "top": 0.5}, ["elevations", "49.8"]),
@@ -389,10 +388,6 @@ def test_image_databases_are_seen_through_ommatidia(tmp_path, capfd):
     plain, ant = (printed(capfd, "evaluate", *databases, *flags)["mean_error_deg"] for flags in ([], ["--eye", "ant"]))
     assert ant < 20
     assert ant != plain
-
-
-def test_the_step_is_for_eyes_only():
-    assert "|" not in str(SeenByOmmatidia(scattered(24, height=12)))
 
 
 @pytest.mark.parametrize(

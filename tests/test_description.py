@@ -6,7 +6,6 @@ from commands import printed, tussock
 from scenes import full_poses, post, random_world, world_of
 
 from tussock.navigation.measures.description import (
-    APART,
     MEASURES,
     _power,
     _weighted,
@@ -17,6 +16,7 @@ from tussock.navigation.measures.figures import description_figure
 from tussock.render.eye import Eye
 from tussock.render.scanline import ScanlineRenderer
 from tussock.world.errors import SettingError
+from tussock.world.full_pose import eye_axes
 from tussock.world.scene import World
 
 
@@ -42,8 +42,6 @@ def test_hits_are_where_rays_meet_triangles():
             ScanlineRenderer(world, Eye(width=90, height=20)).hits(poses)
     assert np.array_equal(which >= 0, alpha > 0)
     assert np.array_equal(np.isinf(away), which < 0)
-    from tussock.world.full_pose import eye_axes
-
     for k, pose in enumerate(poses):
         rows, columns = np.nonzero(which[k] >= 0)
         azimuth = np.pi - (columns + 0.5) * 2 * np.pi / eye.width
@@ -129,4 +127,3 @@ def test_the_command_gives_table_figure_and_json(tmp_path, capfd):
         code, _, error = tussock(capfd, "describe", "tiny", *flags)
         assert code == 2
         assert words in error
-    assert APART == 0.1  # as the figure says

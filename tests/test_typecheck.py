@@ -62,7 +62,7 @@ def test_what_fits_is_let_through():
         lambda: wide(3),
         lambda: half("1"),
         lambda: half(1, "2"),
-        lambda: half(1, 2),  # it is no str
+        lambda: half(1, 2),  # where a str is wanted
         lambda: each(3),
         lambda: Pair(FLAT, np.zeros(4)),
     ],

@@ -57,7 +57,7 @@ class Flight:
         return False
 
     def problem(self, x: float, y: float) -> str:
-        """Why nothing can be at a position: there is no such reason."""
+        """Never asked for: an agent can be anywhere."""
         raise AssertionError(f"an agent can fly at {x}, {y}")
 
     def consists_of(self, index: Int64[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:

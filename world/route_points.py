@@ -123,7 +123,7 @@ def _heights(table: TextTable, kept: Bool[np.ndarray, " n"]) -> Float[np.ndarray
     try:
         column = chosen_column(names[index], "y")
         heights = column.factor * table.column(index, column)[kept]
-    except FileError:  # in pixels, say: then it is no height
+    except FileError:  # its unit is that of a picture, say
         return None
     return heights if (np.abs(heights) <= MAX_COORDINATE).all() else None  # False for nan
 

@@ -9,10 +9,10 @@ import tyro
 
 from tussock.world.errors import SettingError
 
-from ..surroundings import Surroundings
 from .images import check_figure, save
 from .options import WORLD, MeshOptions
 from .terminal import progress
+from .worlds import world_of
 
 MAX_PLACES = 10_000
 
@@ -44,13 +44,7 @@ class DescribeCommand(MeshOptions):
         if not (math.isfinite(self.eye_height_m) and self.eye_height_m > 0):
             raise SettingError(f"--eye-height-m {self.eye_height_m:g}: give metres over 0")
         check_figure(self.out)
-        world = Surroundings(
-            world=self.world,
-            seed=self.seed,
-            reading=self.reading(),
-            ground=self.ground,
-            max_slope=math.radians(self.max_slope_deg),
-        ).open_world()
+        world = world_of(self)
         poses = sampled_poses(world, self.places, self.seed)
         with progress("describing", "places") as report:
             found = describe(world, poses, z=self.eye_height_m, progress=report)

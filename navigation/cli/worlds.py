@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from tussock.render.renderer import Renderer
+    from tussock.world.scene import World
 
 
 @dataclass
@@ -166,13 +167,7 @@ class RouteCommand(MeshOptions):
         check_writable(self.out)
         check_picture(self.picture)
         goal = None if self.goal is None else numbers(self.goal, "--goal", "X,Y", "5,5")
-        world = Surroundings(
-            world=self.world,
-            seed=self.seed,
-            reading=self.reading(),
-            ground=self.ground,
-            max_slope=math.radians(self.max_slope_deg),
-        ).open_world()
+        world = world_of(self)
         if goal is not None:
             goal = tuple(local_xy(world, [goal], "--goal")[0].tolist())
         seed = self.seed if self.route_seed is None else self.route_seed
@@ -183,6 +178,17 @@ class RouteCommand(MeshOptions):
 
             write_overview(world, self.picture, route=route, title=f"{self.world}, route {seed}")
         return {"route": str(self.out), "length_m": route.length, "start": route.start[:2], "goal": route.goal[:2]}
+
+
+def world_of(command: Any) -> "World":
+    """The world of a command whose flags describe no eye."""
+    return Surroundings(
+        world=command.world,
+        seed=command.seed,
+        reading=command.reading(),
+        ground=command.ground,
+        max_slope=math.radians(command.max_slope_deg),
+    ).open_world()
 
 
 def numbers(text: str, flag: str, form: str, example: str) -> tuple[float, ...]:

@@ -10,13 +10,14 @@ Each number is measured at sampled positions. They are for comparing worlds, wit
   sky.
 - *rotation*: depth and width of the valley of the rotational image difference, between views APART from each other (Zeil, Hofmann and
   Chahl 2003).
-- *catchment*: how far from a place the image difference at its heading keeps on growing, on average over four directions.
+- *catchment*: how far from a place the image difference at its heading keeps on growing, or to the edge of
+  the world, on average over four directions.
 - *aliased*: the share of places that are taken for another one: the view APART beside it is more similar to that of another place,
   each at its best rotation.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import attrs
 import numpy as np
@@ -31,6 +32,8 @@ from tussock.world.progress import Progress, printed
 from tussock.world.scene import World
 
 from ..encoding import Encoding
+from ..eye_encoding import EyeEncoding
+from ..models.base import Images
 from .image_difference import differences, displaced
 from .valley import valley_of_rotations
 
@@ -140,7 +143,9 @@ def describe(
     return Description(poses=poses, values=values, **stacks)
 
 
-def _measure(renderer: ScanlineRenderer, pose: Float[np.ndarray, "1 3"], encoded: Callable, here) -> dict:
+def _measure(
+    renderer: ScanlineRenderer, pose: Float[np.ndarray, "1 3"], encoded: EyeEncoding, here: Images
+) -> dict[str, Any]:
     """The measures at one pose that need no other one."""
     view, eye = renderer.render(pose)[0], renderer.eye
     elevations = np.degrees(eye.elevations())
@@ -171,7 +176,9 @@ def _measure(renderer: ScanlineRenderer, pose: Float[np.ndarray, "1 3"], encoded
     }
 
 
-def _growth(renderer: Renderer, pose: Float[np.ndarray, "1 3"], encoded: Callable, here) -> Float[np.ndarray, "4 k"]:
+def _growth(
+    renderer: Renderer, pose: Float[np.ndarray, "1 3"], encoded: EyeEncoding, here: Images
+) -> Float[np.ndarray, "4 k"]:
     """The image difference from a view at its heading, at STEP, 2 STEP, .. in four directions; nan beyond the world."""
     steps = np.arange(STEP, REACH + STEP / 2, STEP)
     curves = np.full((4, len(steps)), np.nan)

@@ -13,7 +13,7 @@ from tussock.world.scene import World
 from ..reports.drawing import CURVE_COLOUR, GOOD_COLOUR, PATH_COLOUR, ROUTE_COLOUR, canvas
 from ..reports.maps import draw_arrows, draw_map, draw_route, map_axes
 from .catchment import Catchment, Landscape
-from .description import STEP, Description
+from .description import APART, STEP, Description
 from .image_difference import Rotational, Translational
 from .place_recognition import PlaceRecognition
 
@@ -61,7 +61,10 @@ def description_figure(found: Description) -> Figure:
     order = angles.argsort()
     _spread(turns, angles[order], found.rotation[:, order])
     turns.set(
-        xlim=(-180, 180), xticks=range(-180, 181, 90), xlabel="degrees of turn, 0.1 m apart", ylabel="image difference"
+        xlim=(-180, 180),
+        xticks=range(-180, 181, 90),
+        xlabel=f"degrees of turn, {APART:g} m apart",
+        ylabel="image difference",
     )
     _spread(growth, STEP * np.arange(1, found.growth.shape[1] + 1), found.growth)
     growth.set(xlim=(0, None), ylim=(0, None), xlabel="m away, at the same heading", ylabel="image difference")
