@@ -4,7 +4,6 @@ A world saved as GLB or PLY carries its ground, sky, field, seed and parameters 
 PLY: a header comment), and reads back equal. GLB files have y up, as the standard of glTF says; PLY files have z up.
 """
 
-import json
 import os
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from .file_kinds import refuse_other_kinds
 from .meshes.axes import turned_y_up
 from .meshes.export import material_writer, meshes_of
 from .meshes.files import read_mesh
+from .meshes.ply_header import comments_of
 from .meshes.reading import MeshReading
 from .params import WORLDS, check_preset, is_generated
 from .registry import suggestion
@@ -113,8 +113,8 @@ def _as_glb(world: World) -> bytes:
 
 
 def _as_ply(world: World) -> bytes:
-    """The content of a PLY, with a comment in its header."""
+    """The content of a PLY, with comments in its header."""
     (mesh,) = meshes_of(world).values()
     data = bytes(mesh.export(file_type="ply"))  # type: ignore[arg-type]
     head, first_element, rest = data.partition(b"element vertex")
-    return head + f"comment {KEY} {json.dumps(to_json(world))}\n".encode("ascii") + first_element + rest
+    return head + comments_of(KEY, to_json(world)).encode("ascii") + first_element + rest

@@ -14,7 +14,8 @@ from .ground_cover import litter, speckles
 from .hedge import hedge
 from .herbs import culms, herb
 from .params import WorldParams
-from .plant_parts import Plant, joined
+from .plant_groups import GroupsBuilder, PlantGroups
+from .plant_parts import NO_PLANT, Plant, joined
 from .plants import bush, grass, leaf, stone, tree, tussock
 from .random_fields import PlaneFunction, random_field, random_ring
 from .trees import branching_tree
@@ -34,27 +35,33 @@ AT_ONCE = {
     "culm": culms,
     "litter": litter,
 }  # of these there are thousands: all of a kind are shaped at once
+KINDS = {"inner_tree": "tree"}  # what a kind is called in PlantGroups, where that differs
 
 
-def generate_plants(params: WorldParams, seed: int) -> Plant:
-    """Triangles and colours of all plants, stones and trees of a world: the same parameters and seed give the same bytes.
+def generate_plants(params: WorldParams, seed: int) -> tuple[Plant, PlantGroups]:
+    """All plants, stones and trees of a world, and which are which: the same parameters and seed give the same bytes.
 
     Raises SettingError for a seed that is not a whole number from 0.
     """
     layout, streams = plant_layout(params, seed)
-    pieces = [(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8))]
+    pieces, groups = [NO_PLANT], GroupsBuilder()
     for kind, rows in layout.items():
         if kind in AT_ONCE:
-            pieces.append(AT_ONCE[kind](params, rows, streams[kind]))
+            piece, row = AT_ONCE[kind](params, rows, streams[kind])
+            groups.add(kind, rows[:, :2], row)
+            pieces.append(piece)
             continue
         for x, y, size, tone in rows.tolist():
             if kind in ("tree", "inner_tree"):
-                corners, colours = _tree(params, x, y, size, tone, streams[kind])
+                piece = _tree(params, x, y, size, tone, streams[kind])
             else:
-                corners, colours = SHAPES[kind](params, size, tone, streams[kind])
-            pieces.append((corners + np.array([x, y, 0], np.float32), colours))
-    pieces += [speckles(params, streams["speckles"]), hedge(params, streams["hedge"])]
-    return joined(pieces)
+                piece = SHAPES[kind](params, size, tone, streams[kind])
+            groups.add(KINDS.get(kind, kind), np.array([(x, y)]), np.zeros(len(piece.rgb), np.int64))
+            pieces.append(piece._replace(triangles=piece.triangles + np.array([x, y, 0], np.float32)))
+    for piece in (speckles(params, streams["speckles"]), hedge(params, streams["hedge"])):
+        groups.add_none(len(piece.rgb))
+        pieces.append(piece)
+    return joined(pieces), groups.build()
 
 
 def _tree(p: WorldParams, x: float, y: float, size: float, tone: float, rng: np.random.Generator) -> Plant:

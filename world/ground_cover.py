@@ -5,11 +5,11 @@ Triangles are (n, 3, 3): triangle, corner, xyz (m, z up). Colours include sunlig
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .geometry import Bounds
 from .params import WorldParams
-from .plant_parts import UP, Plant, directions, joined, simple_leaves, sunlit, tinted
+from .plant_parts import NO_PLANT, UP, Plant, directions, joined, simple_leaves, sunlit, tinted
 from .random_fields import random_field
 
 SPECKLE_Z = (0.001, 0.004)  # m; above the ground at z = 0: so low an eye sees small lumps well
@@ -23,7 +23,7 @@ def speckles(p: WorldParams, rng: np.random.Generator) -> Plant:
     Speckles are `speckle_size` wide in the field, and wider towards the end of the ground, where they are seen from afar only.
     """
     if p.speckle == 0 and p.moss_share == 0:
-        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8)
+        return NO_PLANT
     from scipy.spatial import Delaunay  # takes half a second, which a world from a file need not wait for
 
     corners = _speckle_corners(p, rng)
@@ -60,13 +60,18 @@ def _uneven_grid(area: Bounds, spacing: float, rng: np.random.Generator) -> Floa
     return np.array(area[:2]) + np.column_stack([column / columns, row / rows]) * area.size
 
 
-def litter(p: WorldParams, rows: Float[np.ndarray, "pieces 4"], rng: np.random.Generator) -> Plant:
+def litter(
+    p: WorldParams, rows: Float[np.ndarray, "pieces 4"], rng: np.random.Generator
+) -> tuple[Plant, Int[np.ndarray, " n"]]:
     """Leaves and dead stems that lie on the ground, of one triangle each.
 
     Args:
         p: Parameters of the world.
         rows: x, y, length (m) and tone of each: from 0 to 1, leaves go from their own colour to that of dry grass.
         rng: Generator to draw from.
+
+    Returns:
+        All pieces, and the row of each triangle.
     """
     is_stem, is_green = rng.random((2, len(rows))) < np.array([[p.litter_stems], [p.litter_green]])
     stems, leaves = rows[is_stem], rows[~is_stem]
@@ -78,7 +83,8 @@ def litter(p: WorldParams, rows: Float[np.ndarray, "pieces 4"], rng: np.random.G
     pieces = [(blades, leaf_rgb), (_lying_stems(stems, rng), stem_rgb)]
     for triangles, _ in pieces:
         triangles[..., 2] = np.clip(triangles[..., 2], *LITTER_Z)
-    return joined([sunlit(triangles, rgb, thin=True) for triangles, rgb in pieces])
+    row = np.concatenate([np.flatnonzero(~is_stem), np.flatnonzero(is_stem)])
+    return joined([sunlit(triangles, rgb, thin=True) for triangles, rgb in pieces]), row
 
 
 def _lying_stems(rows: Float[np.ndarray, "n 4"], rng: np.random.Generator) -> Float[np.ndarray, "n 3 3"]:

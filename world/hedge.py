@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from .geometry import Bounds
 from .params import WorldParams
-from .plant_parts import Plant, directions, simple_leaves, sunlit
+from .plant_parts import NO_PLANT, Plant, directions, simple_leaves, sunlit
 from .random_fields import random_ring
 
 DISTANCE = 0.95  # share of the ground's margin between the field and the hedge
@@ -20,7 +20,7 @@ def hedge(p: WorldParams, rng: np.random.Generator) -> Plant:
     It hides the end of the ground from eyes lower than a third of its median height.
     """
     if p.hedge_height == 0:
-        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8)
+        return NO_PLANT
     distance = DISTANCE * p.ground_margin
     foot = _around(p.field, distance)
     n = len(foot)
@@ -34,9 +34,10 @@ def hedge(p: WorldParams, rng: np.random.Generator) -> Plant:
     leaves, level = _foliage(foot, height, part, rng)
     leaf_rgb = rgb[part] * (rng.lognormal(0, 0.1, len(part)) * (0.7 + 0.4 * level))[:, None]
     triangles = np.concatenate([_wall(foot, height), leaves])
-    triangles, colours = sunlit(triangles, np.concatenate([0.7 * rgb.repeat(2, axis=0), leaf_rgb]), thin=True)
+    leafy = sunlit(triangles, np.concatenate([0.7 * rgb.repeat(2, axis=0), leaf_rgb]), thin=True)
     haze = p.haze_at(distance)
-    return triangles, (colours * (1 - haze) + np.array(p.sky_rgb) * haze).astype(np.uint8)
+    hazy = ((each * (1 - haze) + np.array(p.sky_rgb) * haze).astype(np.uint8) for each in leafy[1:])
+    return Plant(leafy.triangles, *hazy)
 
 
 def _around(field: Bounds, distance: float) -> Float[np.ndarray, "n 2"]:

@@ -1,7 +1,7 @@
 """Herbs and flowering grasses of a generated world. Colours include sunlight."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .params import WorldParams
 from .plant_parts import (
@@ -50,13 +50,18 @@ def _flower(p: WorldParams, size: float, rgb: RGB, rng: np.random.Generator) -> 
     return [green, sunlit(petals, tinted(p.herb_flower_rgb, PETALS, 0.08, rng), thin=True)]
 
 
-def culms(p: WorldParams, rows: Float[np.ndarray, "culms 4"], rng: np.random.Generator) -> Plant:
+def culms(
+    p: WorldParams, rows: Float[np.ndarray, "culms 4"], rng: np.random.Generator
+) -> tuple[Plant, Int[np.ndarray, " n"]]:
     """Thin stems of grass with a seed head.
 
     Args:
         p: Parameters of the world.
         rows: x, y, height (m) and tone of each; from 0 to 1, more and more of them are dry.
         rng: Generator to draw from.
+
+    Returns:
+        All culms, and the row of each triangle.
     """
     n = len(rows)
     foot = np.column_stack([rows[:, :2], np.zeros(n)])
@@ -70,6 +75,5 @@ def culms(p: WorldParams, rows: Float[np.ndarray, "culms 4"], rng: np.random.Gen
     rgb = (np.array(p.grass_rgb) * (1 - dry) + np.array(p.dry_rgb) * dry) * rng.lognormal(0, 0.12, (n, 1))
     stem_rgb = darker_below(rgb, stems, rows[:, 2])
     heads = np.moveaxis(heads, 2, 0).reshape(-1, 3, 3)  # four of each culm
-    return joined(
-        [sunlit(stems.reshape(-1, 3, 3), stem_rgb, thin=True), sunlit(heads, rgb.repeat(4, axis=0), thin=True)]
-    )
+    pieces = [sunlit(stems.reshape(-1, 3, 3), stem_rgb, thin=True), sunlit(heads, rgb.repeat(4, axis=0), thin=True)]
+    return joined(pieces), np.concatenate([np.arange(n).repeat(stems.shape[1]), np.arange(n).repeat(4)])

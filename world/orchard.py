@@ -7,6 +7,8 @@ from .errors import SettingError
 from .generate import seeded
 from .geometry import Bounds
 from .params import WorldParams
+from .plant_groups import GroupsBuilder
+from .plant_parts import NO_PLANT, joined
 from .plants import tree
 from .scene import Ground, World
 
@@ -39,16 +41,16 @@ def orchard(seed: int, trees: int = 15, reach: float = 50.0, apart: float = 5.0,
         if not low <= value < np.inf:
             raise SettingError(f"the orchard's {name} is {value!r}; give a {kind} from {low:g}")
     land, shapes = seeded(seed).spawn(2)
-    params, triangles, rgb = WorldParams(), [np.zeros((0, 3, 3), np.float32)], [np.zeros((0, 3), np.uint8)]
+    params, pieces, groups = WorldParams(), [NO_PLANT], GroupsBuilder()
     for x, y in _positions(trees, float(reach), float(apart), land).tolist():
         size, tone = height * float(np.clip(land.lognormal(0, 0.25), 0.6, 1.6)), float(land.random())
-        corners, colours = tree(params, size, tone, shapes)
-        triangles.append(corners + np.array([x, y, 0], np.float32))
-        rgb.append(colours)
+        piece = tree(params, size, tone, shapes)
+        groups.add("tree", np.array([(x, y)]), np.zeros(len(piece.rgb), np.int64))
+        pieces.append(piece._replace(triangles=piece.triangles + np.array([x, y, 0], np.float32)))
     field = Bounds(-float(reach), -float(reach), float(reach), float(reach))
     return World(
-        triangles=np.concatenate(triangles),
-        rgb=np.concatenate(rgb),
+        **joined(pieces)._asdict(),
+        plants=groups.build(),
         ground=Ground((150, 158, 96), field.widened(GROUND_MARGIN)),
         sky_rgb=params.sky_rgb,
         field=field,

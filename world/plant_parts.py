@@ -3,15 +3,32 @@
 Triangles are (n, 3, 3): triangle, corner, xyz (m, z up). Colours include sunlight.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
 from .settings import RGB
 
-Plant = tuple[Float32[np.ndarray, "n 3 3"], UInt8[np.ndarray, "n 3"]]  # triangles, and a colour for each
-
 SUN = np.array([0.48, -0.36, 0.80])  # unit vector towards the sun: a morning in the south-east
 UP = np.array([0.0, 0.0, 1.0])
+
+
+class Plant(NamedTuple):
+    """The triangles of a plant, or of many.
+
+    Attributes:
+        triangles: (n, 3, 3) triangle, corner, xyz (m, z up).
+        rgb: (n, 3) one colour per triangle, as sunlight from SUN makes it.
+        reflectance: (n, 3) the colours that rgb is made of: those in even light.
+    """
+
+    triangles: Float32[np.ndarray, "n 3 3"]
+    rgb: UInt8[np.ndarray, "n 3"]
+    reflectance: UInt8[np.ndarray, "n 3"]
+
+
+NO_PLANT = Plant(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.uint8))
 
 
 def spines(foot, azimuth, length, lean, bend, segments: int) -> Float[np.ndarray, "n points 3"]:
@@ -143,13 +160,18 @@ def sunlit(triangles, rgb, thin: bool = False) -> Plant:
     """Triangles with sunlight in their colours. thin: light shines through, so both sides are equally bright."""
     facing = _normals(triangles) @ SUN
     light = 0.68 + 0.4 * np.abs(facing) if thin else 0.70 + 0.4 * np.maximum(facing, 0) + 0.1 * np.minimum(facing, 0)
-    rgb = np.clip(np.broadcast_to(rgb, (len(triangles), 3)) * light[:, None], 0, 255)
-    return triangles.astype(np.float32), rgb.astype(np.uint8)
+    return coloured(triangles, np.broadcast_to(rgb, (len(triangles), 3)), light)
 
 
-def joined(pieces: list) -> Plant:
+def coloured(triangles, rgb, light) -> Plant:
+    """Triangles whose colours (n, 3) are multiplied by the light on them (n,)."""
+    lit = np.clip(rgb * light[:, None], 0, 255).astype(np.uint8)
+    return Plant(triangles.astype(np.float32), lit, np.clip(rgb, 0, 255).astype(np.uint8))
+
+
+def joined(pieces: list[Plant]) -> Plant:
     """Several pieces as one plant."""
-    return np.concatenate([piece[0] for piece in pieces]), np.concatenate([piece[1] for piece in pieces])
+    return Plant(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
 def _normals(triangles) -> Float[np.ndarray, "n 3"]:

@@ -5,12 +5,14 @@ all tufts at once. They draw from the generator always in the same order. Colour
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .params import WorldParams
 from .plant_parts import (
+    NO_PLANT,
     UP,
     Plant,
+    coloured,
     darker_below,
     directions,
     facing_sun,
@@ -55,7 +57,9 @@ def tussock(p: WorldParams, size: float, tone: float, rng: np.random.Generator) 
     return joined(pieces)
 
 
-def grass(p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Generator) -> Plant:
+def grass(
+    p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Generator
+) -> tuple[Plant, Int[np.ndarray, " n"]]:
     """Tufts of one or a few upright blades, some with a flower on the longest, one after the other, each at its place.
 
     There are so many that their blades are shaped together.
@@ -64,18 +68,22 @@ def grass(p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Gen
         p: Parameters of the world.
         rows: x, y, height of the blades (m) and tone of each tuft.
         rng: Generator to draw from, tuft after tuft.
+
+    Returns:
+        All tufts, and the row of each triangle.
     """
     if len(rows) == 0:
-        return np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8)
+        return NO_PLANT, np.zeros(0, np.int64)
     tufts, flowers = zip(*(_tuft(p, size, tone, rng) for _, _, size, tone in rows.tolist()), strict=True)
     blades = np.array([len(tuft[0]) for tuft in tufts])
     of_tuft = np.repeat(np.arange(len(rows)), blades)
     foot, side, length, lean, bend, width, tint = map(np.concatenate, zip(*tufts, strict=True))
     segments = _grass_segments(rows[:, 2])
     per_blade = 2 * segments - 1  # triangles
-    count = blades * per_blade + np.array([0 if flower is None else len(flower[0]) for flower in flowers])
+    count = blades * per_blade + np.array([0 if flower is None else len(flower.rgb) for flower in flowers])
     first = count.cumsum() - count  # of each tuft's triangles
-    triangles, rgb = np.empty((count.sum(), 3, 3), np.float32), np.empty((count.sum(), 3), np.uint8)
+    n = int(count.sum())
+    all_tufts = Plant(np.empty((n, 3, 3), np.float32), np.empty((n, 3), np.uint8), np.empty((n, 3), np.uint8))
     nth = np.arange(len(of_tuft)) - np.repeat(blades.cumsum() - blades, blades)  # of its tuft
     for k in np.unique(segments).tolist():
         these = segments[of_tuft] == k
@@ -83,12 +91,15 @@ def grass(p: WorldParams, rows: Float[np.ndarray, "tufts 4"], rng: np.random.Gen
         blade = ribbons(shape, side[these], width[these])
         colours = darker_below(tint[these], blade, rows[tuft, 2])
         at = (first[tuft] + nth[these] * (2 * k - 1))[:, None] + np.arange(2 * k - 1)
-        triangles[at.ravel()], rgb[at.ravel()] = sunlit(blade.reshape(-1, 3, 3), colours, thin=True)
+        for whole, part in zip(all_tufts, sunlit(blade.reshape(-1, 3, 3), colours, thin=True), strict=True):
+            whole[at.ravel()] = part
     for start, flower in zip((first + blades * per_blade).tolist(), flowers, strict=True):
         if flower is not None:
-            triangles[start : start + len(flower[0])], rgb[start : start + len(flower[0])] = flower
+            for whole, part in zip(all_tufts, flower, strict=True):
+                whole[start : start + len(part)] = part
+    row = np.repeat(np.arange(len(rows)), count)
     offset = np.column_stack([rows[:, :2], np.zeros(len(rows))]).astype(np.float32)
-    return triangles + np.repeat(offset, count, axis=0)[:, None], rgb
+    return all_tufts._replace(triangles=all_tufts.triangles + offset[row, None]), row
 
 
 def _grass_segments(height):
@@ -201,9 +212,9 @@ def _crown(centre, radius, leaves: int, conical: float, size: float, rgb: RGB, r
     position[:, 2] = np.maximum(position[:, 2], 0.8 * leaf_size + 0.05)
     triangles = simple_leaves(position, outward + 0.5 * directions(leaves, rng), leaf_size, rng)
     of_lump = rng.lognormal(0, 0.08, len(radius))[lump]
-    light = (0.62 + 0.3 * position[:, 2] / size + 0.28 * facing_sun(outward)) * of_lump
-    tint = np.clip(tinted(rgb, leaves, 0.06, rng) * light[:, None], 0, 255)
-    return triangles.astype(np.float32), tint.astype(np.uint8)
+    tint, shade = tinted(rgb, leaves, 0.06, rng), 0.62 + 0.3 * position[:, 2] / size
+    lit = coloured(triangles, tint, (shade + 0.28 * facing_sun(outward)) * of_lump)
+    return lit._replace(reflectance=coloured(triangles, tint, shade * of_lump).rgb)
 
 
 def _plain_tree(

@@ -15,6 +15,7 @@ from .flight import Flight
 from .generate import GENERATOR, generate_plants
 from .geometry import Bounds
 from .params import WORLDS, WorldParams, preset_of
+from .plant_groups import PlantGroups
 from .settings import MAX_COORDINATE, RGB
 from .terrain import MAX_SLOPE, Terrain
 from .textures import Texturing
@@ -69,6 +70,8 @@ class World:
         texturing: Textures and corner colours of the triangles, or None. `rgb` is then the mean colour of each triangle, which
             maps and recordings show; the renderers draw the texturing.
         terrain: The ground of the mesh, which agents stand on (see `on_mesh`), or where they fly; None: they stand at z = 0.
+        reflectance: (n, 3) the colours in even light, which another light is put on (see light.py); None: those of `rgb`.
+        plants: Which triangles are which plant; None where this is not known.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -81,10 +84,13 @@ class World:
     origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     texturing: Texturing | None = None
     terrain: Terrain | Flight | None = None
+    reflectance: UInt8[np.ndarray, "n 3"] | None = None
+    plants: PlantGroups | None = None
 
     def __post_init__(self):
         n = len(self.triangles)
-        for label, shape, kind in (("triangles", (n, 3, 3), np.float32), ("rgb", (n, 3), np.uint8)):
+        arrays = [("triangles", (n, 3, 3), np.float32), ("rgb", (n, 3), np.uint8)]
+        for label, shape, kind in arrays + [("reflectance", (n, 3), np.uint8)] * (self.reflectance is not None):
             array = getattr(self, label)
             if array.shape != shape or array.dtype != kind:
                 raise SettingError(f"{label} of a world are {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
@@ -101,6 +107,8 @@ class World:
             raise SettingError(f"the ground of a world is a Ground or None, got {type(self.ground).__name__}")
         if self.texturing is not None and len(self.texturing.index) != n:
             raise SettingError(f"the texturing of a world is of its {n} triangles, got {len(self.texturing.index)}")
+        if self.plants is not None and len(self.plants.of) != n:
+            raise SettingError(f"the plants of a world are of its {n} triangles, got {len(self.plants.of)}")
         check_colour("the colour of the sky", self.sky_rgb)
         check_bounds("the field", self.field)
         if not (len(self.origin_m) == 3 and np.isfinite(self.origin_m).all()):
@@ -125,10 +133,10 @@ class World:
             raise SettingError(
                 f"the world {params!r} gives an object of type {type(made).__name__}; a preset returns WorldParams or a World"
             )
-        triangles, rgb = generate_plants(made, seed)
+        plant, groups = generate_plants(made, seed)
         return cls(
-            triangles=triangles,
-            rgb=rgb,
+            **plant._asdict(),
+            plants=groups,
             ground=Ground(made.ground_rgb, made.field.widened(made.ground_margin)),
             sky_rgb=made.sky_rgb,
             field=made.field,

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 from .params import WorldParams
 from .plant_parts import (
     Plant,
+    coloured,
     directions,
     facing_sun,
     joined,
@@ -112,6 +113,6 @@ def _leaves(twigs: _Branches, leaves: int, size: float, rgb: RGB, rng: np.random
     triangles = simple_leaves(position, outward + 0.4 * directions(leaves, rng) + [0, 0, 0.3], leaf_size, rng)
     triangles[..., 2] = np.maximum(triangles[..., 2], 0.0)
     of_limb = rng.lognormal(0, 0.1, CHILDREN[0])[twigs.limb[twig]]
-    light = (0.6 + 0.3 * position[:, 2] / size + 0.28 * facing_sun(outward)) * of_limb
-    tint = np.clip(tinted(rgb, leaves, 0.08, rng) * light[:, None], 0, 255)
-    return triangles.astype(np.float32), tint.astype(np.uint8)
+    tint, shade = tinted(rgb, leaves, 0.08, rng), 0.6 + 0.3 * position[:, 2] / size
+    lit = coloured(triangles, tint, (shade + 0.28 * facing_sun(outward)) * of_limb)
+    return lit._replace(reflectance=coloured(triangles, tint, shade * of_limb).rgb)

@@ -1,9 +1,14 @@
 """What a mesh cannot hold of a world, as JSON in its file: ground, sky, field, and how the world was made."""
 
+import base64
+import zlib
 from typing import Any
+
+import numpy as np
 
 from .errors import FileError
 from .geometry import Bounds
+from .plant_groups import PlantGroups
 from .scene import Ground, World
 
 KEY = "tussock"  # of the data in a file that a mesh cannot hold
@@ -21,7 +26,32 @@ def to_json(world: World) -> dict[str, Any]:
         "double_sided": world.double_sided,
         "origin": world.origin,
         "origin_m": list(world.origin_m),
-    }
+    } | _of_triangles(world)
+
+
+def _of_triangles(world: World) -> dict[str, Any]:
+    """What each triangle has besides its colour."""
+    data: dict[str, Any] = {}
+    if world.reflectance is not None:
+        data["reflectance"] = packed(world.reflectance)
+    if world.plants is not None:
+        arrays = {"of": world.plants.of, "kind": world.plants.kind, "foot": world.plants.foot}
+        data["plants"] = {"kinds": list(world.plants.kinds)} | {name: packed(each) for name, each in arrays.items()}
+    return data
+
+
+def packed(array: np.ndarray) -> str:
+    """An array as text, little-endian."""
+    return base64.b64encode(zlib.compress(array.astype(array.dtype.newbyteorder("<")).tobytes(), 9)).decode("ascii")
+
+
+def unpacked(text: str, kind: Any, *shape: int) -> np.ndarray:
+    """The array in a text of `packed`. ValueError where it is damaged."""
+    try:
+        data = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.dtype(kind).newbyteorder("<"))
+    except zlib.error as error:
+        raise ValueError(str(error)) from error
+    return data.astype(kind).reshape(shape)
 
 
 def from_json(data: dict[str, Any]) -> dict[str, Any]:
@@ -38,4 +68,16 @@ def from_json(data: dict[str, Any]) -> dict[str, Any]:
         "double_sided": data["double_sided"],
         "origin": dict(data["origin"]),
         "origin_m": tuple(data.get("origin_m", (0.0, 0.0, 0.0))),
+        "reflectance": unpacked(data["reflectance"], np.uint8, -1, 3) if "reflectance" in data else None,
+        "plants": _plants(data["plants"]) if "plants" in data else None,
     }
+
+
+def _plants(data: dict[str, Any]) -> PlantGroups:
+    """Which triangles are which plant."""
+    return PlantGroups(
+        of=unpacked(data["of"], np.int32, -1),
+        kinds=tuple(data["kinds"]),
+        kind=unpacked(data["kind"], np.uint8, -1),
+        foot=unpacked(data["foot"], np.float32, -1, 3),
+    )

@@ -231,6 +231,12 @@ def _own_data(path: Path, data: Any, triangles: np.ndarray) -> dict[str, Any] | 
         raise FileError(
             f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
         ) from error
+    if any(own[name] is not None and len(rows) != len(triangles) for name, rows in _rows_of(own)):
+        log.warning(
+            f"{path}: it holds {len(triangles)} triangles, and its {KEY} metadata are of another number; which triangles are "
+            "which plant, and their colours without light, are not known"
+        )
+        own |= dict.fromkeys(("reflectance", "plants"))
     bounds = own["field"].widened(max(1.0, float(own["field"].size.max())))
     if bounds.contains(triangles[..., 0], triangles[..., 1]).any():
         return own
@@ -238,3 +244,9 @@ def _own_data(path: Path, data: Any, triangles: np.ndarray) -> dict[str, Any] | 
         f"{path}: its triangles are not where its {KEY} metadata says ({own['field']}); the metadata are ignored"
     )
     return None
+
+
+def _rows_of(own: dict[str, Any]) -> list[tuple[str, Any]]:
+    """What metadata hold of each triangle, by name."""
+    plants = own["plants"]
+    return [("reflectance", own["reflectance"]), ("plants", None if plants is None else plants.of)]

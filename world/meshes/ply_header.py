@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import FileError
 
+COMMENT_LENGTH = 900  # characters of a line of data
 KINDS = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
@@ -49,14 +50,14 @@ class Header:
     end: int
 
     def comment(self, key: str) -> Any:
-        """The JSON in a comment that begins with a key, or None. Raises FileError where it is damaged."""
-        for line in self.comments:
-            if line.startswith(f"{key} "):
-                try:
-                    return json.loads(line[len(key) + 1 :])
-                except (ValueError, RecursionError) as error:
-                    raise FileError(f"its {key} comment is damaged; write the world again") from error
-        return None
+        """The JSON in the comments that begin with a key, or None. Raises FileError where it is damaged."""
+        parts = [line[len(key) + 1 :] for line in self.comments if line.startswith((f"{key} ", f"{key}+"))]
+        if not parts:
+            return None
+        try:
+            return json.loads("".join(part.strip() for part in parts))
+        except (ValueError, RecursionError) as error:
+            raise FileError(f"its {key} comment is damaged; write the world again") from error
 
     def stores_float32(self) -> bool:
         """Whether the corners are stored with 24 bits."""
@@ -68,6 +69,13 @@ class Header:
             if each.name in "xyz"
         }
         return bool(self.order) and "f4" in kinds
+
+
+def comments_of(key: str, data: Any) -> str:
+    """Comment lines that hold data as JSON, see `Header.comment`. The lines are short, as some programs cut long ones."""
+    text = json.dumps(data, separators=(",", ":")).replace(" ", "\\u0020")  # no line begins or ends with a space
+    parts = [text[at : at + COMMENT_LENGTH] for at in range(0, len(text), COMMENT_LENGTH)]
+    return "".join(f"comment {key}{'+' if i else ' '}{part}\n" for i, part in enumerate(parts))
 
 
 def read_header(data: bytes) -> Header:
