@@ -3,7 +3,6 @@
 import dataclasses
 import logging
 import math
-import os
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,7 +15,20 @@ from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.meshes.reading import MeshReading
-from tussock.world.settings import MAX_COORDINATE, choice, instance_of, number, refuse, settings, switch, text, whole
+from tussock.world.settings import (
+    MAX_COORDINATE,
+    choice,
+    converted,
+    instance_of,
+    number,
+    refuse,
+    settings,
+    switch,
+    text,
+    whole,
+)
+
+from .surroundings_fields import as_folder, as_light, as_route, as_world
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +38,7 @@ if TYPE_CHECKING:
     from tussock.world.flight import Flight
     from tussock.world.geometry import Route
     from tussock.world.scene import World
+    from tussock.world.specs import Spec
 
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Surroundings")
@@ -40,6 +53,7 @@ OF_WORLDS = (
     "max_slope",
     "altitude",
     "cull_back_faces",
+    "light",
     "route",
     "route_seed",
     "route_length",
@@ -48,36 +62,6 @@ OF_WORLDS = (
     "renderer",
     "posture",
 )  # fields that databases do not take
-
-
-def _world(value: Any) -> Any:
-    """A world; a file as text, as the command line gives it."""
-    if isinstance(value, str):
-        return value
-    from tussock.world.params import is_generated
-    from tussock.world.scene import World
-
-    if isinstance(value, Path):
-        return os.path.join(os.curdir, value) if is_generated(str(value)) else str(value)  # a file named like a preset
-    if not isinstance(value, World):
-        raise SettingError(f"world is {value!r}; give a preset's name, a file or a World")
-    return value
-
-
-def _route(value: Any) -> Any:
-    """A route; a file as its path."""
-    if isinstance(value, str | Path):
-        return Path(value)
-    from tussock.world.geometry import Route
-
-    if not isinstance(value, Route | None):
-        raise SettingError(f"route is {value!r}; give a Route, its file, or None")
-    return value
-
-
-def _folder(value: Any) -> Any:
-    """The folder of an image database as its path."""
-    return value if value is None else Path(value)
 
 
 def _eye(surroundings: "Surroundings") -> Eye:
@@ -107,6 +91,8 @@ class Surroundings:
         max_slope: Steepest ground of a mesh that can be stood and walked on (rad).
         altitude: Height over z = 0 at which they fly, as that of their eye (m); None: as `ground` says.
         cull_back_faces: Triangles are seen from their front only, as the original Sussex renderer did.
+        light: The sun and the sky: a spec, such as "sun azimuth_deg=90" (see world/light.py). None: the light in the world's own
+            colours, without shadows, and a sky of one colour.
         route: A `Route`, its file, or None to generate one. It may be in the coordinates of the world's file; see `World.origin_m`.
         route_seed: Of a generated route; None means `seed`.
         route_length: Of a generated route (m).
@@ -123,21 +109,22 @@ class Surroundings:
         threads: To draw with, and, in an experiment, to learn and compare with; None means one for each core.
     """
 
-    world: Any = attrs.field(default="tussock-field", converter=_world)
+    world: Any = attrs.field(default="tussock-field", converter=as_world)
     world_seed: int | None = whole(None, low=0, optional=True)
     reading: MeshReading = instance_of(MeshReading, attrs.Factory(MeshReading), "a MeshReading")
     ground: str = choice("flat", GROUNDS)
     max_slope: float = number(math.radians(45.0), low=math.radians(1.0), high=math.radians(89.0), unit="rad")
     altitude: float | None = number(None, low=-MAX_COORDINATE, high=MAX_COORDINATE, unit="m", optional=True)
     cull_back_faces: bool = switch(False)
-    route: Any = attrs.field(default=None, converter=_route)
+    light: "Spec | None" = converted(default=None, converter=as_light)
+    route: Any = attrs.field(default=None, converter=as_route)
     route_seed: int | None = whole(None, low=0, optional=True)
     route_length: float = number(8.0, low=0.1, unit="m")
     headings: str = choice("auto", HEADINGS)
     columns: str | None = text(None, optional=True)
     smooth: float = number(0.0, low=0, unit="m")
-    route_database: Path | None = attrs.field(default=None, converter=_folder)
-    grid_database: Path | None = attrs.field(default=None, converter=_folder)
+    route_database: Path | None = attrs.field(default=None, converter=as_folder)
+    grid_database: Path | None = attrs.field(default=None, converter=as_folder)
     eye: Eye = instance_of(Eye, attrs.Factory(_eye, takes_self=True), "an Eye")
     posture: Posture = instance_of(Posture, attrs.Factory(Posture), "a Posture")
     seed: int = whole(0, low=0)
@@ -212,6 +199,10 @@ class Surroundings:
         seed = self.seed if self.world_seed is None else self.world_seed
         world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
         world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
+        if self.light is not None:
+            from tussock.render.lighting import lit
+
+            world = lit(world, self.light.make())
         if self.ground == "mesh":
             return world.on_mesh(self.max_slope)
         if self.ground == "route" or self.altitude is not None:

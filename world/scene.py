@@ -14,6 +14,7 @@ from .errors import SettingError
 from .flight import Flight
 from .generate import GENERATOR, generate_plants
 from .geometry import Bounds
+from .light import Light
 from .params import WORLDS, WorldParams, preset_of
 from .plant_groups import PlantGroups
 from .settings import MAX_COORDINATE, RGB
@@ -72,6 +73,7 @@ class World:
         terrain: The ground of the mesh, which agents stand on (see `on_mesh`), or where they fly; None: they stand at z = 0.
         reflectance: (n, 3) the colours in even light, which another light is put on (see light.py); None: those of `rgb`.
         plants: Which triangles are which plant; None where this is not known.
+        light: The light that its colours show (see render/lighting.py), and that makes the sky; None: a sky of one colour.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -86,6 +88,7 @@ class World:
     terrain: Terrain | Flight | None = None
     reflectance: UInt8[np.ndarray, "n 3"] | None = None
     plants: PlantGroups | None = None
+    light: Light | None = None
 
     def __post_init__(self):
         n = len(self.triangles)

@@ -4,10 +4,12 @@ import base64
 import zlib
 from typing import Any
 
+import attrs
 import numpy as np
 
 from .errors import FileError
 from .geometry import Bounds
+from .light import Light
 from .plant_groups import PlantGroups
 from .scene import Ground, World
 
@@ -30,8 +32,8 @@ def to_json(world: World) -> dict[str, Any]:
 
 
 def _of_triangles(world: World) -> dict[str, Any]:
-    """What each triangle has besides its colour."""
-    data: dict[str, Any] = {}
+    """What each triangle has besides its colour, and the light on it."""
+    data: dict[str, Any] = {} if world.light is None else {"light": attrs.asdict(world.light)}
     if world.reflectance is not None:
         data["reflectance"] = packed(world.reflectance)
     if world.plants is not None:
@@ -70,6 +72,7 @@ def from_json(data: dict[str, Any]) -> dict[str, Any]:
         "origin_m": tuple(data.get("origin_m", (0.0, 0.0, 0.0))),
         "reflectance": unpacked(data["reflectance"], np.uint8, -1, 3) if "reflectance" in data else None,
         "plants": _plants(data["plants"]) if "plants" in data else None,
+        "light": Light(**data["light"]) if "light" in data else None,
     }
 
 

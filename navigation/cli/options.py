@@ -130,6 +130,9 @@ class ViewOptions(MeshOptions):
     panorama, or the model file's."""
     cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
+    light: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Sun and sky, with shadows: 'sun azimuth_deg=90 elevation_deg=30', overcast, or 'daylight latitude_deg=51 longitude_deg=0
+    time=2026-06-21T10:30'. Azimuths are counter-clockwise from east. Default: the light in the world's colours, without shadows."""
     gaze: Annotated[str, tyro.conf.arg(metavar="level|body")] = default(Posture, "gaze")
     """level: the head keeps the eye level. body: the eye pitches and rolls with the ground beneath the body (--ground mesh)."""
     body_length_m: float = default(Posture, "body_length")
