@@ -8,6 +8,8 @@ import pytest
 from scenes import hills, mesh_world, post, random_world, textured_world, world_of
 
 from tussock.navigation.experiment import Experiment
+from tussock.navigation.senses import Readings
+from tussock.navigation.sky_compass import DorsalRim
 from tussock.render import Eye, open_renderer
 from tussock.render.lighting import LIFT, TEXEL, light_on_triangles, lit
 from tussock.render.shadows import in_the_sun
@@ -269,3 +271,50 @@ def test_a_walk_learns_and_arrives_in_the_light():
     flags = {"world": "tiny", "seed": 3, "route_length": 1.5, "eye": Eye(width=90, height=20), "route_seed": 1}
     trajectory = Experiment(**flags, light="sun azimuth_deg=120 elevation_deg=35").run()
     assert trajectory.summary()["arrived"]
+
+
+# The compass in the sky
+
+
+@pytest.mark.parametrize("elevation", [2, 25, 50, 70])
+def test_a_level_dorsal_rim_reads_its_heading(elevation):
+    light, rim = Light(azimuth=0.7, elevation=math.radians(elevation)), DorsalRim(unit_noise=0.0)
+    for heading in np.linspace(-3, 3, 9).tolist():
+        read = rim.heading(light, heading, (0.0, 0.0), np.random.default_rng(0), None)
+        assert abs(wrap_angle(read - heading)) < math.radians(3)
+
+
+def test_without_the_sun_a_walk_begins_with_either_half_and_keeps_it():
+    rim, errors = DorsalRim(unit_noise=0.0, sees_sun=False), []
+    for seed in range(40):
+        readings = Readings(rim, np.random.default_rng(seed), LOW)
+        headings = np.linspace(0.2, 2.2, 9)
+        read, _ = readings.read(headings, np.full(9, 0.1))
+        error = np.abs(wrap_angle(read - headings))
+        assert np.ptp(error) < 0.1
+        errors.append(error[0])
+    opposite = np.array(errors) > 1
+    assert 8 < opposite.sum() < 32
+    assert np.allclose(np.array(errors)[opposite], math.pi, atol=0.1)
+
+
+def test_noise_tilt_and_clouds_make_a_compass_worse():
+    def spread(light, tilt=(0.0, 0.0), **settings):
+        random, rim = np.random.default_rng(1), DorsalRim(**settings)
+        return np.std([float(wrap_angle(rim.heading(light, 1.0, tilt, random, 1.0) - 1.0)) for _ in range(200)])
+
+    def offset(tilt):
+        rim = DorsalRim(unit_noise=0.0)
+        return abs(float(wrap_angle(rim.heading(LOW, 1.0, tilt, np.random.default_rng(0), 1.0) - 1.0)))
+
+    cloudy = Light(azimuth=LOW.azimuth, elevation=LOW.elevation, clouds=0.9)
+    assert spread(LOW, unit_noise=0.01) < spread(LOW, unit_noise=0.05) < spread(cloudy, unit_noise=0.05)
+    assert offset((0.0, 0.0)) < 0.02 < offset((math.radians(20), math.radians(10)))
+
+
+def test_a_walk_with_a_sky_compass_needs_a_sky():
+    flags = {"world": "tiny", "seed": 3, "route_length": 1.5, "eye": Eye(width=90, height=20), "route_seed": 1}
+    flags |= {"senses": "dorsal-rim", "navigator": "path-integration"}
+    with pytest.raises(SettingError, match="--light"):
+        Experiment(**flags).run()
+    assert Experiment(**flags, light="sun azimuth_deg=120 elevation_deg=35").run().summary()["arrived"]
