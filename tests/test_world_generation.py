@@ -358,6 +358,7 @@ def test_a_registered_preset_is_generated_by_name(monkeypatch):
 
 def test_the_public_names_are_listed_and_each_loads():
     names = {"World", "Pose", "Route", "Bounds", "Ground", "WorldParams", "open_world", "read_world", "write_world"}
+    names.add("Light")
     names |= {
         "read_route",
         "write_route",

@@ -35,7 +35,7 @@ PRESSURE = 1010.0  # hPa; the atmosphere lifts the sun by half a degree at the h
 REFRACTED = math.radians(-0.575)  # no light of the sun comes around the earth from below this
 CLEAR_SKY = (-1.0, -0.32, 10.0, -3.0, 0.45)  # a, b, c, d, e of ISO 15469, type 12
 OVERCAST_SKY = (4.0, -0.70, 0.0, -1.0, 0.0)  # type 1
-GREY = 0.6  # how far an overcast sky loses its colour
+GREY = 0.6  # how far an overcast sky loses its colour; a clear one is bluer than that of one colour, by its own ratios again
 BRIGHT_PART = 0.7  # the brightest part of the sky, above this share of it, has its full colour or is brighter
 
 
@@ -137,7 +137,8 @@ def sky_colours(
     from .textures import to_display, to_linear
 
     own = to_linear(np.array(sky_rgb) / 255)
-    colour = own + GREY * light.clouds * (own.mean() - own)
+    grey = own + GREY * (own.mean() - own)
+    colour = light.clouds * grey + (1 - light.clouds) * own * (own / max(own.max(), 1e-9))
     relative = sky_luminance(light, directions) / np.quantile(sky_luminance(light, _hemisphere()), BRIGHT_PART)
     return 255 * to_display(np.clip(relative[:, None] * colour, 0, 1))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import comparison
 import descriptions
 import eyes
+import light
 import ommatidia
 import pictures
 import processors
@@ -63,6 +64,7 @@ MEASUREMENTS = (
     comparison.MEASUREMENTS
     | descriptions.MEASUREMENTS
     | eyes.MEASUREMENTS
+    | light.MEASUREMENTS
     | ommatidia.MEASUREMENTS
     | pictures.MEASUREMENTS
     | processors.MEASUREMENTS
