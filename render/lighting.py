@@ -161,4 +161,4 @@ def _ground_texture(world: World, ground: Ground, part: Bounds, texel: float, li
     rgba = np.empty((rows, columns, 4), np.uint8)
     rgba[..., :3] = product_table()[np.array(ground.rgb), np.where(free, sun, shade).reshape(rows, columns, 1)]
     rgba[..., 3] = 255
-    return Texture(rgba=rgba, wrap=("clamp", "clamp"))
+    return Texture(rgba=rgba, wrap=("clamp", "clamp"), filter="nearest")
