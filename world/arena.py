@@ -10,6 +10,7 @@ from .plant_parts import Plant, joined
 from .scene import Ground, World
 
 SIDES = 240  # of the wall
+BANDS = 6  # of the wall's brightness, from its foot to its top
 THICKNESS = 0.02  # m, of the wall
 IN_FRONT = 0.001  # m; so far in front of the wall are the cues
 FIELD = 0.68  # half of the field's side, in radii: all of the field is inside the wall
@@ -88,11 +89,12 @@ def _wall(radius: float, height: float) -> Plant:
     """The wall, lit by lamps above: brighter at its top, and a little more on one side. Its rim is darker."""
     angle = np.linspace(-np.pi, np.pi, SIDES, endpoint=False)
     inner, outer = (r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (radius, radius + THICKNESS))
-    rings = [np.column_stack([inner, np.full(SIDES, share * height)]) for share in (0.0, 0.35, 0.7, 1.0)]
+    rings = [np.column_stack([inner, np.full(SIDES, share * height)]) for share in np.linspace(0, 1, BANDS + 1)]
     rings.append(np.column_stack([outer, np.full(SIDES, height)]))
     rings.append(np.column_stack([outer, np.zeros(SIDES)]))
+    lights = [*np.linspace(0.9, 1.0, BANDS), 0.75, 0.6]
     triangles, rgb = [], []
-    for low, high, light in zip(rings[:-1], rings[1:], (0.9, 0.95, 1.0, 0.75, 0.6), strict=True):
+    for low, high, light in zip(rings[:-1], rings[1:], lights, strict=True):
         next_low, next_high = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
         sides = [np.stack([low, next_high, next_low], axis=1), np.stack([low, high, next_high], axis=1)]
         triangles.append(np.stack(sides, axis=1).reshape(-1, 3, 3))
@@ -102,32 +104,35 @@ def _wall(radius: float, height: float) -> Plant:
 
 def _bar(radius: float, height: float, angle: float, slot: float, irregular: float, rng: np.random.Generator) -> Plant:
     """A vertical bar in the middle of a slot (both rad)."""
-    width = slot * radius * (0.5 + irregular * rng.uniform(-0.28, 0.1))
+    width = slot * (0.5 + irregular * rng.uniform(-0.28, 0.1))
     top = height * (1 - irregular * max(0.0, float(rng.uniform(-0.25, 0.55))))
-    outline = np.array([(-width / 2, 0.0), (width / 2, 0.0), (width / 2, top), (-width / 2, top)])
-    return _on_wall(radius, angle, outline, CUE_RGB[0])
+    parts = int(np.ceil(width / (2 * np.pi / SIDES)))  # so narrow that the bar follows the wall
+    half = radius * width / parts / 2
+    outline = np.array([(-half, 0.0), (half, 0.0), (half, top), (-half, top)])
+    middles = angle + width * ((np.arange(parts) + 0.5) / parts - 0.5)
+    return joined([_on_wall(radius, each, outline, CUE_RGB[0]) for each in middles.tolist()])
 
 
 def _shape(radius: float, height: float, angle: float, slot: float, rng: np.random.Generator) -> Plant:
     """A shape in the middle of a slot (both rad), at some height on the wall."""
     kind, rgb = SHAPES[int(rng.integers(len(SHAPES)))], CUE_RGB[int(rng.integers(len(CUE_RGB)))]
-    size = min(0.45 * height, 0.6 * slot * radius) * rng.uniform(0.75, 1.0)
+    size = min(0.5 * height, 0.75 * slot * radius) * rng.uniform(0.8, 1.0)
     middle = rng.uniform(0.6 * size, height - 0.6 * size)
     outlines = [outline * size + (0.0, middle) for outline in _outlines(kind)]
     return joined([_on_wall(radius, angle, outline, rgb) for outline in outlines])
 
 
-def _outlines(kind: str) -> list[Float[np.ndarray, "n 2"]]:
+def _outlines(kind: str) -> list[Float[np.ndarray, "corners 2"]]:
     """The convex parts of a shape that is about 1 wide, counter-clockwise."""
     if kind == "cross":
         bar = np.array([(-0.5, -0.14), (0.5, -0.14), (0.5, 0.14), (-0.5, 0.14)])
-        return [bar, bar[:, ::-1][::-1]]
+        return [bar, bar[::-1, ::-1]]
     corners = {"disc": 24, "triangle": 3, "square": 4}[kind]
     turn = (np.arange(corners) + (0.5 if kind == "square" else 0.25 if kind == "triangle" else 0)) * 2 * np.pi / corners
     return [np.column_stack([np.cos(turn), np.sin(turn)]) * (0.5 if kind == "disc" else 0.6)]
 
 
-def _on_wall(radius: float, angle: float, outline: Float[np.ndarray, "n 2"], rgb: tuple[int, int, int]) -> Plant:
+def _on_wall(radius: float, angle: float, outline: Float[np.ndarray, "corners 2"], rgb: tuple[int, int, int]) -> Plant:
     """A convex shape in front of the wall.
 
     Args:

@@ -53,6 +53,6 @@ DESERT = partial(
     bush_density=0.09, bush_height=0.4, bush_leaves=170, bush_rgb=(120, 124, 92), bark_rgb=(112, 92, 72),
     leaf_density=0.0, stone_density=0.12, stone_size=0.12, stone_rgb=(166, 128, 96),
     trees=9, tree_height=1.8, tree_distance=4.0, tree_gaps=0.6, tree_leaves=160, tree_rgb=(112, 118, 82), tree_other_rgb=(130, 120, 86),
-    litter_density=12.0, litter_length=0.025, litter_stems=0.8, leaf_rgb=(150, 122, 86),
-    speckle=0.09, speckle_size=0.06, pebble_density=30.0, pebble_size=0.016, far_hill_height=12.0,
+    litter_density=15.0, litter_length=0.025, litter_stems=0.8, leaf_rgb=(150, 122, 86),
+    speckle=0.09, speckle_size=0.06, pebble_density=55.0, pebble_size=0.02, far_hill_height=18.0,
 )  # fmt: skip
