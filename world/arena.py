@@ -92,7 +92,7 @@ def _wall(radius: float, height: float) -> Plant:
     rings = [np.column_stack([inner, np.full(SIDES, share * height)]) for share in np.linspace(0, 1, BANDS + 1)]
     rings.append(np.column_stack([outer, np.full(SIDES, height)]))
     rings.append(np.column_stack([outer, np.zeros(SIDES)]))
-    lights = [*np.linspace(0.9, 1.0, BANDS), 0.75, 0.6]
+    lights = [*np.linspace(0.9, 1.0, BANDS), 0.5, 0.6]
     triangles, rgb = [], []
     for low, high, light in zip(rings[:-1], rings[1:], lights, strict=True):
         next_low, next_high = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
