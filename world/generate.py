@@ -56,24 +56,27 @@ def generate_plants(params: WorldParams, seed: int, land: Land | None) -> Plant:
     """
     layout, streams = plant_layout(params, seed)
     pieces = [(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.uint8))]
-    feet: list[tuple[float, float] | None] = [None]  # of each piece, where it is a tree
+    feet: list[tuple[int, float, float]] = []  # of each tree: which piece it is, x and y (m)
     for kind, rows in layout.items():
         if kind in AT_ONCE:
             pieces.append(AT_ONCE[kind](params, rows, streams[kind]))
-            feet.append(None)
             continue
         for x, y, size, tone in rows.tolist():
             if kind in TREES:
                 corners, colours = _tree(params, x, y, size, tone, streams[kind])
+                feet.append((len(pieces), x, y))
             else:
                 corners, colours = SHAPES[kind](params, size, tone, streams[kind])
             pieces.append((corners + np.array([x, y, 0], np.float32), colours))
-            feet.append((x, y) if kind in TREES else None)
     covers = [hedge(params, streams["hedge"]), far_hills(params, streams["far_hills"])]
     if land is None:
         return joined([*pieces, speckles(params, streams["speckles"]), *covers])
-    standing = [land.standing(*piece, foot) for piece, foot in zip(pieces, feet, strict=True)]
-    return joined([*standing, *(land.standing(*cover) for cover in covers), (land.triangles, land.rgb)])
+    pieces += covers
+    below = [triangles[..., :2].astype(np.float64) for triangles, _ in pieces]
+    for piece, x, y in feet:
+        below[piece][:] = x, y
+    triangles, rgb = joined(pieces)
+    return joined([(land.raised(triangles, np.concatenate(below)), rgb), (land.triangles, land.rgb)])
 
 
 def _tree(p: WorldParams, x: float, y: float, size: float, tone: float, rng: np.random.Generator) -> Plant:

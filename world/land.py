@@ -5,16 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
+from .errors import SettingError
 from .geometry import Bounds
 from .ground_cover import SPECKLE_Z, ground_corners, shades, uneven_grid
 from .params import WorldParams
-from .plant_parts import Plant, sunlit
+from .plant_parts import sunlit
 from .relief import RUT_MARGIN, Relief
 from .terrain import MAX_SLOPE, Terrain
 
 HILL_WIDTH = 0.1  # m; width of the ground's triangles in the field where it has no speckles, mounds or ruts
 BAND = 10  # widths of a triangle; around the field, triangles are twice as wide in each further band
 ACROSS = 8  # triangles across a mound or a rut
+MAX_POINTS = 2 * 10**7  # that mounds and ruts are looked for at; 112 m x 112 m with ruts or mounds that are 20 cm wide
 SOIL = 0.9  # brightness of the soil of mounds and ruts
 
 
@@ -41,22 +43,12 @@ class Land:
         height[beyond] = self.relief.height(np.asarray(xy, np.float64)[beyond])
         return height
 
-    def standing(
-        self,
-        triangles: Float32[np.ndarray, "m 3 3"],
-        rgb: UInt8[np.ndarray, "m 3"],
-        foot: tuple[float, float] | None = None,
-    ) -> Plant:
-        """What is on flat ground, raised: by the height of the ground at its foot (m), or, without one, as `draped` does."""
-        if foot is None:
-            return self.draped(triangles), rgb
-        return triangles + np.array([0.0, 0.0, self.height(np.array([foot]))[0]], np.float32), rgb
-
-    def draped(self, triangles: Float32[np.ndarray, "m 3 3"]) -> Float32[np.ndarray, "m 3 3"]:
-        """Triangles (m) of what is on flat ground, with each corner raised by the height of the ground beneath it."""
-        raised = triangles.copy()
-        raised[..., 2] += self.height(triangles[..., :2].reshape(-1, 2)).reshape(-1, 3).astype(np.float32)
-        return raised
+    def raised(
+        self, triangles: Float32[np.ndarray, "m 3 3"], below: Float[np.ndarray, "m 3 2"]
+    ) -> Float32[np.ndarray, "m 3 3"]:
+        """Triangles of what is on flat ground (m), with each corner raised by the height of the ground at a position (m)."""
+        lift = self.height(below.reshape(-1, 2)).reshape(-1, 3)
+        return np.dstack([triangles[..., :2], triangles[..., 2] + lift.astype(np.float32)])
 
 
 def land_of(p: WorldParams, rng: np.random.Generator) -> Land | None:
@@ -77,7 +69,8 @@ def land_of(p: WorldParams, rng: np.random.Generator) -> Land | None:
         z += mesh.uniform(*SPECKLE_Z, len(corners))
     triangles = _facing_up(np.column_stack([corners, z])[Delaunay(corners).simplices])
     middle = triangles[..., :2].mean(axis=1)
-    rgb = shades(p, middle, colours) * np.where(relief.is_dug(middle), SOIL, 1.0)[:, None]
+    soil = shades(p, middle, colours) if p.speckle or p.moss_share else np.array(p.ground_rgb)
+    rgb = soil * np.where(relief.is_dug(middle), SOIL, 1.0)[:, None]
     triangles, rgb = sunlit(triangles, rgb)
     return Land(triangles, rgb, Terrain(triangles, np.ones(len(triangles), dtype=bool), MAX_SLOPE), relief)
 
@@ -93,6 +86,11 @@ def _corners(p: WorldParams, relief: Relief, rng: np.random.Generator) -> Float[
     x0, y0, x1, y1 = p.field.widened(max(p.border + p.mound_width if p.mound_density else 0.0, RUT_MARGIN))
     land = p.land
     area = Bounds(max(x0, land.x_min), max(y0, land.y_min), min(x1, land.x_max), min(y1, land.y_max))
+    if (points := np.prod(area.size / fine)) > MAX_POINTS:
+        raise SettingError(
+            f"ground as fine as {100 * fine:.2g} cm, as these mounds or ruts need, would have {points:,.0f} points in this field; give wider "
+            f"ones or a smaller field ({MAX_POINTS:,} points at most)"
+        )
     details = uneven_grid(area, fine, rng)
     is_kept = ~relief.is_dug(corners) | ~area.contains(*corners.T)
     is_kept[-4:] = True  # the corners of the ground

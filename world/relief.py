@@ -17,6 +17,7 @@ from .random_fields import PlaneFunction, random_field
 
 RUT_MARGIN = 2.0  # m around the field in which ruts become flat
 SHOULDERS = 0.2  # height of the soil on both sides of a rut, in depths of the rut
+BATCH = 100_000  # positions at once
 LARGEST = 1.8  # of mounds and ruts, in shares of their median size
 
 
@@ -42,11 +43,17 @@ class Relief:
 
     def height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Height at positions (both m)."""
-        return self.hills(xy) + self.mounds(xy) + self.ruts(xy)
+        return _in_batches(lambda part: self.hills(part) + self.mounds(part) + self.ruts(part), xy)
 
     def is_dug(self, xy: Float[np.ndarray, "n 2"]) -> Bool[np.ndarray, " n"]:
         """Whether there are mounds or ruts at positions (m): bare soil, and small shapes."""
-        return (self.mounds(xy) != 0) | (self.ruts(xy) != 0)
+        return _in_batches(lambda part: np.abs(self.mounds(part)) + np.abs(self.ruts(part)), xy) > 0
+
+
+def _in_batches(function: PlaneFunction, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """The values of a function at many positions (m), within a bounded memory."""
+    parts = [function(xy[start : start + BATCH]) for start in range(0, len(xy), BATCH)]
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def _none(xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
