@@ -264,6 +264,11 @@ def test_ground_that_is_too_steep_everywhere_is_refused_in_one_line():
         generated(f"tiny {HILLS}").on_mesh(max_slope=1e-9)
 
 
+def test_a_ground_with_too_many_points_is_refused():
+    with pytest.raises(SettingError, match=r"mounds or ruts need, would have .* points in this field"):
+        generated("tiny field_width=100 field_depth=100 rut_depth=0.05 rut_width=0.1")
+
+
 # Files
 
 

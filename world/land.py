@@ -88,8 +88,8 @@ def _corners(p: WorldParams, relief: Relief, rng: np.random.Generator) -> Float[
     area = Bounds(max(x0, land.x_min), max(y0, land.y_min), min(x1, land.x_max), min(y1, land.y_max))
     if (points := np.prod(area.size / fine)) > MAX_POINTS:
         raise SettingError(
-            f"ground as fine as {100 * fine:.2g} cm, as these mounds or ruts need, would have {points:,.0f} points in this field; give wider "
-            f"ones or a smaller field ({MAX_POINTS:,} points at most)"
+            f"ground as fine as {100 * fine:.2g} cm, as these mounds or ruts need, would have {points:,.0f} points in this field, and "
+            f"{MAX_POINTS:,} is the limit; give wider ones or a smaller field"
         )
     details = uneven_grid(area, fine, rng)
     is_kept = ~relief.is_dug(corners) | ~area.contains(*corners.T)
