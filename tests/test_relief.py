@@ -284,6 +284,8 @@ def test_a_file_holds_all_of_it(tmp_path, suffix):
     assert (again.terrain.part, again.terrain.max_slope) == (world.terrain.part, world.terrain.max_slope)
     xy = somewhere(world, 50)
     np.testing.assert_array_equal(again.ground_height(xy), world.ground_height(xy))
+    opened = Surroundings(world=str(tmp_path / f"a{suffix}"), max_slope=np.radians(30)).open_world()
+    np.testing.assert_array_equal(opened.ground_height(xy), world.ground_height(xy))
     write_world(again, tmp_path / f"b{suffix}")
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
