@@ -86,7 +86,8 @@ class Surroundings:
         world: A preset's name (parameters may follow it), a file, or a `World`.
         world_seed: Of a generated world; None means `seed`.
         reading: How the file of a world is read: its axis that is up, its unit, and whether losses are refused.
-        ground: "flat": agents stand at z = 0. "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`). "route":
+        ground: "flat": agents stand at z = 0, or, in a world that has a terrain of its own (a generated one with hills), on that.
+            "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`). "route":
             they fly, at the heights of the route (`Route.heights`): everywhere at that of its nearest point.
         max_slope: Steepest ground of a mesh that can be stood and walked on (rad).
         altitude: Height over z = 0 at which they fly, as that of their eye (m); None: as `ground` says.
@@ -207,6 +208,8 @@ class Surroundings:
             return world.on_mesh(self.max_slope)
         if self.ground == "route" or self.altitude is not None:
             return world.flown(self._flight(world))
+        if world.terrain is not None:
+            return world if isinstance(self.world, World) else world.on_mesh(self.max_slope)
         if isinstance(self.world, str) and not is_generated(self.world):
             remark_on_ground(world, self.world, self.eye.z)
         return world
@@ -215,7 +218,7 @@ class Surroundings:
         """Where agents fly, below their eye. Raises SettingError where the route has no heights, or is under the ground."""
         import numpy as np
 
-        from tussock.world.flight import Flight
+        from tussock.world.flight import Flight, check_flight
 
         if self.altitude is not None:
             places = np.array([[0.0, 0.0, self.altitude]])
@@ -226,8 +229,7 @@ class Surroundings:
                     "ground route flies at the heights of a route: give one with a column z_m that has a number in each row, or an altitude"
                 )
             places = np.column_stack([route.xy, route.heights])
-        if world.ground is not None and (low := places[:, 2].min()) <= 0:
-            raise SettingError(f"a flight at z = {low:g} m is under the ground of the world; give heights over 0")
+        check_flight(world, places)
         return Flight(places - [0, 0, self.eye.z])
 
     def open_route(self, world: "World") -> "Route":
