@@ -191,6 +191,15 @@ class Surroundings:
             from tussock.render.images.folders import world_of
 
             return world_of(self.route_database, self.grid_database)
+        world = self._world_and_ground()
+        if self.light is None:
+            return world
+        from tussock.render.lighting import lit
+
+        return lit(world, self.light.make())
+
+    def _world_and_ground(self) -> "World":
+        """The world, with what agents stand or fly on."""
         from tussock.world.files import open_world
         from tussock.world.ground_check import remark_on_ground
         from tussock.world.params import is_generated
@@ -200,10 +209,6 @@ class Surroundings:
         seed = self.seed if self.world_seed is None else self.world_seed
         world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
         world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
-        if self.light is not None:
-            from tussock.render.lighting import lit
-
-            world = lit(world, self.light.make())
         if self.ground == "mesh":
             return world.on_mesh(self.max_slope)
         if self.ground == "route" or self.altitude is not None:

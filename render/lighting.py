@@ -38,7 +38,7 @@ def lit(world: World, light: Light) -> World:
     brightness = np.rint(255 * to_display(light_on_triangles(world, light))).astype(np.uint8)
     rgb = product_table()[reflectance, brightness[:, None]]
     texturing = world.texturing and _shaded(world.texturing, reflectance, brightness)
-    lit_world = dataclasses.replace(world, rgb=rgb, texturing=texturing, light=light)
+    lit_world = dataclasses.replace(world, rgb=rgb, texturing=texturing, light=light, unlit=world)
     return lit_world if world.ground is None else _with_ground(lit_world, world, world.ground, light)
 
 

@@ -75,6 +75,7 @@ class World:
         reflectance: (n, 3) the colours in even light, which another light is put on (see light.py); None: those of `rgb`.
         plants: Which triangles are which plant; None where this is not known.
         light: The light that its colours show (see render/lighting.py), and that makes the sky; None: a sky of one colour.
+        unlit: The world that the light was put on; None where there is no light, or where it was read with its light from a file.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -90,6 +91,7 @@ class World:
     reflectance: UInt8[np.ndarray, "n 3"] | None = None
     plants: PlantGroups | None = None
     light: Light | None = None
+    unlit: "World | None" = None
 
     def __post_init__(self):
         n = len(self.triangles)
