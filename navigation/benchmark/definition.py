@@ -3,13 +3,17 @@
 import hashlib
 import json
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby, product
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from tussock.render.eye import Eye
+from tussock.render.eye import Eye, compound_eye
+from tussock.render.posture import Posture
+from tussock.world.errors import SettingError
+from tussock.world.registry import suggestion
 
 from ..body import Body
 from ..experiment import Experiment
@@ -39,6 +43,18 @@ BASE = Experiment(
     renderer="cpu",
     threads=1,
 )
+
+
+class Asked(NamedTuple):
+    """What tells the runs of an entry apart: condition (empty for none), world, seed, noise (degrees), and displacement (m)."""
+
+    condition: str
+    world: str
+    seed: int
+    heading_noise_deg: float
+    offset_m: float
+
+
 ENCODING = "edges"  # of entries that choose none
 EARLY = {"world", "world_seed", "cull_back_faces", "route", "route_seed", "route_length_m"}  # as old as the benchmarks
 # Settings newer than the benchmarks: where they are as by default, the digest is as it was before them.
@@ -53,8 +69,25 @@ OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg
 
 
 @dataclass(frozen=True, kw_only=True)
+class Condition:
+    """What else is asked of an entry, in each world and from each displacement.
+
+    Attributes:
+        name: In results and tables.
+        changes: What differs from the runs without a condition, as `Experiment.replace` takes it.
+        world: Parameters that the presets of the worlds are given.
+        noise_deg: On every turn (standard deviation, degrees).
+    """
+
+    name: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    world: str = ""
+    noise_deg: float = 20.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class Benchmark:
-    """A run for each combination of a world, a noise and a displacement.
+    """A run for each combination of a world, a noise and a displacement; then, for each condition, of a world and a displacement.
 
     Attributes:
         name: Name that results refer to.
@@ -62,6 +95,7 @@ class Benchmark:
         noises_deg: On every turn (standard deviations, degrees).
         displacements: Of the start, to the left of the route (m; negative: right).
         base: What all runs share.
+        conditions: What else is asked, in its order.
     """
 
     name: str
@@ -69,29 +103,41 @@ class Benchmark:
     noises_deg: tuple[float, ...]
     displacements: tuple[float, ...]
     base: Experiment = BASE
+    conditions: tuple[Condition, ...] = ()
 
     def __len__(self) -> int:
-        return len(self.worlds) * len(self.noises_deg) * len(self.displacements)
+        return len(self.asked())
 
     def sweep(self, model: str = "perfect-memory", encoding: str = ENCODING, navigator: str = NAVIGATOR) -> Sweep:
         """The runs of a model and a navigator."""
-        axes = {
-            "world": [{"world": world, "seed": seed} for world, seed in self.worlds],
-            "heading_noise": [{"body__heading_noise": math.radians(noise)} for noise in self.noises_deg],
+        entry = {"model": model, "encoding": encoding, "navigator": navigator}
+        usual = Sweep.over(self.name, self.base.replace(**entry), self._axes("", self.noises_deg))
+        others = [
+            Sweep.over(self.name, self.base.replace(**entry, **each.changes), self._axes(each.world, [each.noise_deg]))
+            for each in self.conditions
+        ]
+        return Sweep(self.name, usual.axes, [run for sweep in (usual, *others) for run in sweep.experiments])
+
+    def _axes(self, parameters: str, noises_deg: Sequence[float]) -> dict[str, Sequence[Any]]:
+        return {
+            "world": [{"world": f"{world} {parameters}".strip(), "seed": seed} for world, seed in self.worlds],
+            "heading_noise": [{"body__heading_noise": math.radians(noise)} for noise in noises_deg],
             "start_offset": self.displacements,
         }
-        return Sweep.over(self.name, self.base.replace(model=model, encoding=encoding, navigator=navigator), axes)
 
     def by_world(self, encoding: str = ENCODING) -> Iterator[list[Experiment]]:
-        """The runs, those of one world together. Their model is for the entry to bring."""
-        for _, group in groupby(self.sweep(encoding=encoding).experiments, key=lambda run: (run.world, run.seed)):
-            yield list(group)
+        """The runs, those of one world and one condition together. Their model is for the entry to bring."""
+        runs = zip(self.asked(), self.sweep(encoding=encoding).experiments, strict=True)
+        for _, group in groupby(runs, key=lambda run: (run[0].condition, run[0].world, run[0].seed)):
+            yield [run for _, run in group]
 
-    def asked(self) -> list[tuple[str, int, float, float]]:
-        """World, seed, noise (degrees) and displacement (m) of every run, in their order."""
+    def asked(self) -> list[Asked]:
+        """What every run asks, in their order."""
+        names = [("", "", self.noises_deg), *((each.name, each.world, [each.noise_deg]) for each in self.conditions)]
         return [
-            (world, seed, noise, displacement)
-            for (world, seed), noise, displacement in product(self.worlds, self.noises_deg, self.displacements)
+            Asked(condition, f"{world} {parameters}".strip(), seed, noise, displacement)
+            for condition, parameters, noises in names
+            for (world, seed), noise, displacement in product(self.worlds, noises, self.displacements)
         ]
 
     def chain(self, encoding: str = ENCODING) -> str:
@@ -100,14 +146,17 @@ class Benchmark:
 
     def digest(self) -> str:
         """Digest of all settings, and of the first world of each preset and its route, to a tenth of a millimetre."""
-        settings, usual = settings_of(self.base), settings_of(Experiment())
-        added = [name for name in LATER if settings[name] == usual[name]]
-        shared = {name: value for name, value in settings.items() if name in TYPES and name not in (*OF_ENTRY, *added)}
+        base, usual = settings_of(self.base), settings_of(Experiment())
+        added = [name for name in LATER if base[name] == usual[name]]
+        shared = {name: value for name, value in base.items() if name in TYPES and name not in (*OF_ENTRY, *added)}
         digest, generated = hashlib.sha256(json.dumps([shared, ENCODING], sort_keys=True).encode()), set()
         for runs in self.by_world():
             names = ("world", "seed", "heading_noise_deg", "offset_m")
             asked = [[settings[name] for name in names] for settings in map(settings_of, runs)]
             digest.update(json.dumps(asked).encode())
+            settings = settings_of(runs[0])
+            special = {name: settings[name] for name in TYPES if name not in OF_ENTRY and settings[name] != base[name]}
+            digest.update(json.dumps(special, sort_keys=True).encode() if special else b"")
             if runs[0].world in generated:
                 continue
             generated.add(runs[0].world)
@@ -127,4 +176,37 @@ def _worlds(count: int) -> tuple[tuple[str, int], ...]:
 BENCHMARK = Benchmark(name="tussock-2", worlds=_worlds(4), noises_deg=(0.0, 20.0, 40.0), displacements=(-0.3, 0.0, 0.3))
 # A first look, in a minute. Its results compare with no others, as its name says.
 QUICK = Benchmark(name="tussock-2-quick", worlds=_worlds(1), noises_deg=(0.0, 40.0), displacements=(-0.3, 0.3))
-BENCHMARKS = {each.name: each for each in (BENCHMARK, QUICK)}
+
+CONDITIONS = (
+    Condition(name="sun + 4 h", changes={"test_change": "sun amount=1 hours=4"}),
+    Condition(name="overcast", changes={"test_change": "clouds amount=1"}),
+    Condition(name="20 % of plants gone", changes={"test_change": "removed amount=0.2"}),
+    Condition(name="wind", changes={"test_change": "wind amount=0.5 direction_deg=90"}),
+    Condition(
+        name="head tilted",
+        changes={"test_change": "eye-turned amount=0.5 axis=pitch | eye-turned amount=0.5 axis=roll"},
+    ),
+    Condition(name="hills", changes={"posture": Posture(gaze="body")}, world="hill_height=0.6 mound_density=0.1"),
+    Condition(name="296 degrees", changes={"eye__field": math.radians(296.0)}),
+    Condition(name="ant's eye", changes={"eye": compound_eye("ant", z=0.01)}),
+)
+MORNING = "sun azimuth_deg=-20 elevation_deg=35"
+TUSSOCK_3 = Benchmark(
+    name="tussock-3",
+    worlds=_worlds(2),
+    noises_deg=BENCHMARK.noises_deg,
+    displacements=BENCHMARK.displacements,
+    base=BASE.replace(light=MORNING),
+    conditions=CONDITIONS,
+)
+QUICK_3 = replace(TUSSOCK_3, name="tussock-3-quick", worlds=_worlds(1), noises_deg=(0.0,), displacements=(0.3,))
+BENCHMARKS = {each.name: each for each in (BENCHMARK, QUICK, TUSSOCK_3, QUICK_3)}
+
+
+def benchmark_of(name: str, *, quick: bool = False) -> Benchmark:
+    """The test bed of a name, or its first look. Raises SettingError."""
+    if name not in BENCHMARKS:
+        raise SettingError(
+            f"there is no test bed {name!r}{suggestion(name, BENCHMARKS)}; give {BENCHMARK.name} or {TUSSOCK_3.name}"
+        )
+    return BENCHMARKS[f"{name}-quick" if quick and not name.endswith("-quick") else name]

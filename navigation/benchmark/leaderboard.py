@@ -52,6 +52,7 @@ def leaderboard(results: Sequence[Result]) -> str:
 def _entries(ranked: Sequence[tuple[dict, Result]]) -> str:
     """The entries, in their order."""
     noises, presets = (list(ranked[0][0][part]) for part in ("by_noise_deg", "by_preset"))
+    conditions = [name for name in ranked[0][0].get("by_condition", {}) if name]
     _, worlds = arrivals(ranked[0][1].runs)
     header = [
         "entry",
@@ -60,6 +61,7 @@ def _entries(ranked: Sequence[tuple[dict, Result]]) -> str:
         "off the route",
         *(f"noise {noise}" for noise in noises),
         *presets,
+        *conditions,
         "memory",
     ]
     rows = [
@@ -70,6 +72,7 @@ def _entries(ranked: Sequence[tuple[dict, Result]]) -> str:
             _cm(scores["totals"]["mean_deviation_m"]),
             *(_percent(scores["by_noise_deg"][noise]["arrived_share"]) for noise in noises),
             *(_percent(scores["by_preset"][preset]["arrived_share"]) for preset in presets),
+            *(_percent(scores["by_condition"][name]["arrived_share"]) for name in conditions),
             _size(result.memory_bytes),
         ]
         for scores, result in ranked

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, printed
 
 from ..experiment import Experiment
@@ -73,8 +74,11 @@ def enter_learner(
         InputError: As `enter_named` does.
     """
     progress = printed(progress, "walking", "runs")
-    done: list[Experiment] = []
     results: list[dict[str, Any]] = []
+    if benchmark.conditions:
+        raise SettingError(
+            f"{benchmark.name} changes worlds after learning, and the Gymnasium task does not; enter {BENCHMARK.name}"
+        )
     chain = PANORAMA if encoding is None else benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding or ENCODING):
@@ -92,9 +96,8 @@ def enter_learner(
                     began = time.perf_counter()
                     walked = walk(env, task, act)
                     results.append(walked | {"seconds": time.perf_counter() - began, "learn_seconds": learned})
-                    done.append(task.run)
-                    progress(len(done), len(benchmark))
-    result = result_of(benchmark, name, chain, done, results)
+                    progress(len(results), len(benchmark))
+    result = result_of(benchmark, name, chain, results)
     return result, write_result(result, out, benchmark)
 
 

@@ -8,7 +8,6 @@ from typing import Any
 from tussock.world.errors import InputError, SettingError
 from tussock.world.progress import Progress, printed
 
-from ..experiment import Experiment
 from ..experiment_fields import MODEL_SUFFIX
 from ..experiment_keys import key_of
 from ..models import model_spec
@@ -75,7 +74,7 @@ def _results(sweeps: Mapping[str, Sweep], out: Path, benchmark: Benchmark, chain
     for entry, sweep in sweeps.items():
         rows = [kept[key] for run in sweep.experiments if (key := key_of(run)) in kept]
         if len(rows) == len(sweep):
-            result = result_of(benchmark, entry, chain, sweep.experiments, rows)
+            result = result_of(benchmark, entry, chain, rows)
             results.append((result, write_result(result, out, benchmark)))
     return results
 
@@ -117,7 +116,6 @@ def enter(
         InputError: As `enter_named` does.
     """
     progress = printed(progress, "walking", "runs")
-    done: list[Experiment] = []
     results: list[dict[str, Any]] = []
     chain = benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
@@ -129,7 +127,6 @@ def enter(
                     raise walked
                 times = {"seconds": walked.seconds, "learn_seconds": walked.learn_seconds}
                 results.append(walked.results | times | {"error": walked.refused})
-        done += runs
-        progress(len(done), len(benchmark))
-    result = result_of(benchmark, name, chain, done, results)
+        progress(len(results), len(benchmark))
+    result = result_of(benchmark, name, chain, results)
     return result, write_result(result, out, benchmark)

@@ -18,10 +18,8 @@ from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.settings import number, settings, switch, text, whole
 
 from ..encoding import Encoding
-from ..experiment import Experiment
-from ..experiment_settings import settings_of
 from ..intervals import share_interval
-from .definition import BENCHMARKS, Benchmark
+from .definition import BENCHMARKS, Asked, Benchmark
 
 PANORAMA = "panorama"  # the encoding of entries that get the view as it is
 TIMES = {
@@ -30,7 +28,7 @@ TIMES = {
 }  # of a result, and of a run in the table of a sweep
 RESULTS = "results"  # the folder of the results, next to the runs, which are a sweep's with files of its own
 LIMIT = 2**63  # numbers of a result are smaller
-RUN_FIELDS = ("world", "seed", "heading_noise_deg", "offset_m")  # of a line: what tells the runs of an entry apart
+RUN_FIELDS = Asked._fields  # of a line: what tells the runs of an entry apart
 
 
 @settings
@@ -38,7 +36,8 @@ class Line:
     """A run: what was asked, and its results; None for what is not known.
 
     Attributes:
-        world: Preset of the world.
+        condition: Name of the condition; empty for none.
+        world: Preset of the world, and its parameters.
         seed: Of the world, the route, the model and the noise.
         heading_noise_deg: Of the noise on every turn (standard deviation, degrees).
         offset_m: Displacement of the start (m, to the left).
@@ -52,6 +51,7 @@ class Line:
         error: Why the run could not be done.
     """
 
+    condition: str = text("")
     world: str = text()
     seed: int = whole(low=0)
     heading_noise_deg: float = number(low=-LIMIT, high=LIMIT)
@@ -66,9 +66,18 @@ class Line:
     error: str | None = text(None, optional=True)
 
     @property
-    def asked(self) -> tuple:
-        """What was asked, in the order of RUN_FIELDS."""
-        return tuple(getattr(self, name) for name in RUN_FIELDS)
+    def asked(self) -> Asked:
+        """What was asked."""
+        return Asked(*(getattr(self, name) for name in RUN_FIELDS))
+
+    @property
+    def preset(self) -> str:
+        """Preset of the world."""
+        return self.world.split()[0]
+
+    def to_json(self) -> dict[str, Any]:
+        """Its values by name; without a condition, where there is none."""
+        return {name: value for name, value in attrs.asdict(self).items() if name != "condition" or value}
 
 
 @settings
@@ -96,7 +105,10 @@ class Result:
     times: Mapping[str, float] = attrs.field()
 
     def scores(self) -> dict[str, Any]:
-        """The numbers of all runs, and of those of each displacement, noise and preset."""
+        """The numbers of all runs, and of those of each displacement, noise, preset and condition.
+
+        Displacements, noises and presets are compared over the runs without a condition.
+        """
         totals = score(self.runs)
         totals["arrived_share_95"] = interval_over_worlds(self.runs)
         failed = [run for run in self.runs if not run.arrived]
@@ -107,24 +119,26 @@ class Result:
             "could_not_run": sum(run.error is not None for run in self.runs),
             "poor_steps": sum(poor) if poor else None,
         }
-        parts = {"by_displacement_m": "offset_m", "by_noise_deg": "heading_noise_deg", "by_preset": "world"}
-        return {"totals": totals} | {name: self._by(key) for name, key in parts.items()}
-
-    def _by(self, key: str) -> dict[str, Any]:
-        values = dict.fromkeys(getattr(run, key) for run in self.runs)
-        return {
-            value if isinstance(value, str) else f"{value:g}": score(
-                [run for run in self.runs if getattr(run, key) == value]
-            )
-            for value in values
-        }
+        parts = {"by_displacement_m": "offset_m", "by_noise_deg": "heading_noise_deg", "by_preset": "preset"}
+        usual = [run for run in self.runs if not run.condition]
+        scores = {"totals": totals} | {name: _by(key, usual) for name, key in parts.items()}
+        return scores | ({} if len(usual) == len(self.runs) else {"by_condition": _by("condition", self.runs)})
 
     def to_json(self) -> str:
         """The text of its file: the runs at the end, one in each line."""
         head = {name: getattr(self, name) for name in ("benchmark", "entry", "encoding", "tussock", "processor")}
         head |= self.scores() | {"memory_bytes": self.memory_bytes, "times": dict(self.times)}
-        lines = ",\n".join(f"  {json.dumps(attrs.asdict(run))}" for run in self.runs)
+        lines = ",\n".join(f"  {json.dumps(run.to_json())}" for run in self.runs)
         return f'{json.dumps(head, indent=1)[:-2]},\n "runs": [\n{lines}\n ]\n}}\n'
+
+
+def _by(key: str, runs: Sequence[Line]) -> dict[str, Any]:
+    """The numbers of runs by the values of a field."""
+    values = dict.fromkeys(getattr(run, key) for run in runs)
+    return {
+        value if isinstance(value, str) else f"{value:g}": score([run for run in runs if getattr(run, key) == value])
+        for value in values
+    }
 
 
 def score(runs: Sequence[Line]) -> dict[str, Any]:
@@ -146,14 +160,13 @@ def interval_over_worlds(runs: Sequence[Line]) -> list[float] | None:
 
 def arrivals(runs: Sequence[Line]) -> tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]:
     """Which runs arrived (1, else 0), and the number of each run's world."""
-    worlds = {world: k for k, world in enumerate(dict.fromkeys((run.world, run.seed) for run in runs))}
-    return np.array([float(run.arrived) for run in runs]), np.array([worlds[run.world, run.seed] for run in runs])
+    worlds = {world: k for k, world in enumerate(dict.fromkeys((run.preset, run.seed) for run in runs))}
+    return np.array([float(run.arrived) for run in runs]), np.array([worlds[run.preset, run.seed] for run in runs])
 
 
-def line_of(experiment: Experiment, results: Mapping[str, Any]) -> Line:
+def line_of(asked: Asked, results: Mapping[str, Any]) -> Line:
     """The line of a run, from its results by name."""
-    settings = settings_of(experiment)
-    values: dict[str, Any] = {name: settings[name] for name in RUN_FIELDS}
+    values: dict[str, Any] = asked._asdict()
     values |= {each.name: results.get(each.name) for each in attrs.fields(Line) if each.name not in RUN_FIELDS}
     values["arrived"] = bool(values["arrived"])
     return Line(**values)
@@ -163,7 +176,6 @@ def result_of(
     benchmark: Benchmark,
     entry: str,
     encoding: str,
-    runs: Sequence[Experiment],
     results: Sequence[Mapping[str, Any]],
 ) -> Result:
     """The result of an entry, from its runs and the results of each by the names of a sweep's table."""
@@ -175,7 +187,7 @@ def result_of(
         encoding=encoding,
         tussock=version("tussock"),
         processor=llvmlite.binding.get_host_cpu_name(),
-        runs=list(map(line_of, runs, results)),
+        runs=list(map(line_of, benchmark.asked(), results)),
         memory_bytes=max(sizes, default=None),
         times={name: float(np.mean([each[column] for each in done])) for name, column in TIMES.items() if done},
     )
@@ -223,7 +235,16 @@ def read_result(path: Path, known: Mapping[str, Benchmark] = BENCHMARKS) -> Resu
     """Read a result. Raises FileError for an invalid one, and where its runs are not those of its benchmark, if that is known."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        lines = [Line(**{each.name: run[each.name] for each in attrs.fields(Line)}) for run in content["runs"]]
+        lines = [
+            Line(
+                **{
+                    each.name: run[each.name]
+                    for each in attrs.fields(Line)
+                    if each.name in run or each.name != "condition"
+                }
+            )
+            for run in content["runs"]
+        ]
         if not lines:
             raise ValueError("no runs")
         times = {name: float(seconds) for name, seconds in content["times"].items()}

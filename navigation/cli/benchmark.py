@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import tyro
 
 from tussock.world.errors import SettingError
 
@@ -22,6 +24,8 @@ class BenchmarkCommand(WorkerOptions):
     """What the models get of a view: edges, grey or sky, or a chain of steps. The eye is the test bed's."""
     navigator: str = "scan"
     """What steers by the models, as in 'lateral gain=4'; another than scan is named in the result."""
+    test_bed: Annotated[str, tyro.conf.arg(metavar="tussock-2|tussock-3")] = "tussock-2"
+    """What is asked. tussock-3 also changes light, plants, wind, head, ground and eye: what does an entry survive?"""
     quick: bool = False
     """A first look: other, fewer runs, whose results compare with no others."""
     leaderboard: Path | None = None
@@ -45,11 +49,11 @@ class BenchmarkCommand(WorkerOptions):
         workers = self.started_workers()
         from tussock.world.specs import split_list
 
-        from ..benchmark.definition import BENCHMARK, QUICK
+        from ..benchmark.definition import benchmark_of
         from ..benchmark.models import enter_named
         from ..models import MODELS
 
-        benchmark = QUICK if self.quick else BENCHMARK
+        benchmark = benchmark_of(self.test_bed, quick=self.quick)
         names = list(MODELS.builtin) if self.model == "all" else split_list(self.model or "")
         message(f"{', '.join(dict.fromkeys(names))}: {len(benchmark)} runs of {benchmark.name} each")
         with progress("walking", "runs", verbose=True) as report:
