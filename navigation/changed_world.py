@@ -46,7 +46,12 @@ def changed_views(experiment: "Experiment", renderer: "Renderer", route: "Route"
 def in_changed_world(experiment: "Experiment", trained: "TrainedNavigator") -> "Iterator[TrainedNavigator]":
     """What an experiment has learned, in the world where it walks; see `changed_views`."""
     with changed_views(experiment, trained.renderer, trained.route) as renderer:
-        yield trained if renderer is trained.renderer else dataclasses.replace(trained, renderer=renderer)
+        yield with_views(trained, renderer)
+
+
+def with_views(trained: "TrainedNavigator", renderer: "Renderer") -> "TrainedNavigator":
+    """The same navigator, which sees what a renderer draws."""
+    return trained if renderer is trained.renderer else dataclasses.replace(trained, renderer=renderer)
 
 
 def check_no_gusts(experiment: "Experiment") -> None:

@@ -24,7 +24,7 @@ from tussock.world.settings import converted, instance_of, number, settings, who
 from tussock.world.specs import Spec, takes
 
 from .body import Body
-from .changed_world import in_changed_world
+from .changed_world import changed_views, with_views
 from .devices import check_device, chosen_device
 from .displacement import Displacement
 from .experiment_fields import as_encoding, as_model, as_navigator, check_matches, check_start
@@ -240,11 +240,10 @@ class Experiment(Surroundings):
 
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
-        with self.open_renderer(world) as renderer:
+        with self.open_renderer(world) as renderer, changed_views(self, renderer, route) as views:
             device = "" if self.device == "cpu" else f", device: {self.device}"
             log.info(f"renderer: {renderer.backend}{device}")
-            with in_changed_world(self, self.train(renderer, route, progress)) as trained:
-                yield trained
+            yield with_views(self.train(renderer, route, progress), views)
 
     def run(self, progress: Progress | None = None) -> "Trajectory":
         """Learn the route and walk it.

@@ -49,7 +49,8 @@ VIEW_SETTINGS = (  # decide with these the views that are learned
 )  # fmt: skip
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "collisions", "body_radius_m", "release_m", "release_deg",
-    "displace_at", "displace_m", "test_change", "change_seed", "on_lost", "waypoint_m", "put_back_ahead_m", "arrive_m", "lost_m", "patience_m", "max_steps",
+    "displace_at", "displace_m", "test_change", "change_seed",
+    "on_lost", "waypoint_m", "put_back_ahead_m", "arrive_m", "lost_m", "patience_m", "max_steps",
 )  # fmt: skip
 
 WALK_FIELDS = tuple(

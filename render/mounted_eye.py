@@ -45,7 +45,7 @@ class MountedEye:
 
 def mounted(poses: Float[np.ndarray, "n 6"], mount: EyeMount) -> Float[np.ndarray, "n 6"]:
     """The full poses of eyes that are mounted otherwise than at some full poses: turned in the frame of the body."""
-    poses = poses + [0, 0, 0, mount.raised, 0, 0]
+    poses = poses + np.array([0, 0, 0, mount.raised, 0, 0])
     if mount == dataclasses.replace(EyeMount(), raised=mount.raised):
         return poses
     in_body = eye_axes(np.array([[0, 0, mount.turn, 0, mount.pitch, mount.roll]]))[0]

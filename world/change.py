@@ -85,9 +85,10 @@ class Change:
             return CHANGES.find(name, importing=importing)
 
         try:
+            check_names(text)
             return cls(tuple(CHANGES.spec(part.strip(), find).make() for part in text.split("|")))
         except SettingError as error:
-            raise SettingError(f"change {text!r}: {error}") from error
+            raise error if str(error).startswith("change ") else SettingError(f"change {text!r}: {error}") from error
 
     def apply(self, world: "World", seed: int = 0, route: "Route | None" = None, state: int = 0) -> "World":
         """The changed world; the world itself where every amount is 0.
@@ -98,8 +99,6 @@ class Change:
             route: A new object stands next to it.
             state: Which of the states of a walk; see `states`.
         """
-        from .scene import World
-
         changed = world
         for part, rng in self._with_generators(seed):
             if part.amount == 0:
@@ -107,7 +106,7 @@ class Change:
             if getattr(part, "states", 1) > 1:
                 part = part.in_state(state, rng)
             changed = part(changed, rng, route)
-            if not isinstance(changed, World):
+            if not isinstance(changed, type(world)):
                 raise SettingError(f"{self._name(part)} gives an object of type {type(changed).__name__}, not a World")
         if changed is world:
             return world
@@ -168,6 +167,8 @@ def as_change(value: Any) -> "Change | None":
 def check_names(text: str) -> None:
     """Refuse a change with an unknown name, without importing what the names stand for. Raises SettingError."""
     for part in text.split("|"):
+        if not part.strip():
+            raise SettingError(f"change {text!r}: a part is empty; give names and parameters, with | between them only")
         CHANGES.check((part.split() or [""])[0])
 
 

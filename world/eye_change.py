@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from .settings import choice, number, settings
 
@@ -35,6 +35,7 @@ class EyeRaised:
         amount: 1: 1 cm higher.
     """
 
+    name: ClassVar[str] = "eye-raised"
     amount: float = number(low=0, high=1)
 
     def __call__(self, world: Any, rng: Any, route: Any = None) -> Any:
@@ -55,6 +56,7 @@ class EyeTurned:
         axis: "turn": to the left, about the vertical axis. "pitch": its front upwards. "roll": its right side downwards.
     """
 
+    name: ClassVar[str] = "eye-turned"
     amount: float = number(low=0, high=1)
     axis: str = choice("turn", ("turn", "pitch", "roll"))
 

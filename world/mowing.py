@@ -1,6 +1,6 @@
 """Plants that are mown: cut off at a height. For `Change`, of change.py."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -26,6 +26,7 @@ class Mown:
         amount: Plants are cut to 1 m x 0.02 ** amount: not at all at 0, to 14 cm at 0.5, and to 2 cm at 1.
     """
 
+    name: ClassVar[str] = "mown"
     amount: float = number(low=0, high=1)
 
     @property

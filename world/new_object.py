@@ -1,7 +1,7 @@
 """A new object in view. For `Change`, of change.py."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -31,6 +31,7 @@ class NewObject:
         shape: "cylinder" or "box".
     """
 
+    name: ClassVar[str] = "object"
     amount: float = number(low=0, high=1)
     shape: str = choice("cylinder", ("cylinder", "box"))
 
@@ -46,7 +47,7 @@ class NewObject:
         corners = np.concatenate(
             [np.column_stack([ring, np.full(sides, height)]) for height in (-SINK, HEIGHT * self.amount)]
         )
-        faces = hull(corners + [*xy, z])
+        faces = hull(corners + np.array([*xy, z]))
         made = sunlit(faces, np.array(RGB))
         return appended(world, made.triangles, made.rgb, made.reflectance)
 

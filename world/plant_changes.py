@@ -1,7 +1,7 @@
 """Plants that are gone, stand elsewhere, are more, or have grown. For `Change`, of change.py."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import attrs
 import numpy as np
@@ -49,6 +49,7 @@ class Removed:
         kinds: Kinds of plants that it is a share of, such as tussock or tussock,grass; all where none is named.
     """
 
+    name: ClassVar[str] = "removed"
     amount: float = number(low=0, high=1)
     kinds: tuple[str, ...] = _kinds()
 
@@ -70,6 +71,7 @@ class Moved:
         kinds: As of `Removed`.
     """
 
+    name: ClassVar[str] = "moved"
     amount: float = number(low=0, high=1)
     distance: float = number(0.5, above=0, high=1000, unit="m")
     kinds: tuple[str, ...] = _kinds()
@@ -99,6 +101,7 @@ class Added:
         kinds: As of `Removed`.
     """
 
+    name: ClassVar[str] = "added"
     amount: float = number(low=0, high=1)
     kinds: tuple[str, ...] = _kinds()
 
@@ -152,6 +155,7 @@ class Grown:
         kinds: As of `Removed`.
     """
 
+    name: ClassVar[str] = "grown"
     amount: float = number(low=0, high=1)
     kinds: tuple[str, ...] = _kinds()
 

@@ -6,7 +6,7 @@ turn about their own feet. The distance of every point from the foot stays the s
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -31,7 +31,7 @@ STIFF = ("stone", "litter", "leaf")  # kinds that do not bend; litter and fallen
 BY_BLADE = ("tussock",)  # kinds whose blades have feet of their own
 GROWTH_OF_ANGLE = 0.1  # exponent, over the distance from the foot; small, as the length of a blade changes with it
 SLENDERNESS = 3.0  # a plant of an unknown kind is slender if it is so many times as high as wide
-LOW, TALL = 0.02, 1.0  # m; a plant of an unknown kind bends as a bush between these heights, as a tree above them, and not below
+LOW, TALL = 0.02, 1.0  # m; plants of unknown kinds bend as bushes between these heights, as trees above, and not below
 VARIATION = 0.2  # plants bend by up to this share more or less than others of their kind
 VEERING = math.radians(30.0)  # standard deviation of the direction of gusts of strength 1
 
@@ -47,6 +47,7 @@ class Wind:
             amounts differ by up to this share, and whose directions differ by 30 degrees times this (standard deviation).
     """
 
+    name: ClassVar[str] = "wind"
     amount: float = number(low=0, high=1)
     direction: float = number(0.0, low=-2 * math.pi, high=2 * math.pi, unit="rad")
     gusts: float = number(0.0, low=0, high=1)

@@ -16,8 +16,8 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
-from tussock.render.images.source import DatabaseViews
 from tussock.render.changed_views import at_step
+from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.render.tilted_eye import TiltedEye
 from tussock.world.geometry import Route
