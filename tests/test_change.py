@@ -22,6 +22,7 @@ from tussock.navigation.sweeps.sweep import run_sweep, side_by_side
 from tussock.navigation.training import training_source
 from tussock.render.changed_views import ChangedViews
 from tussock.render.eye import Eye
+from tussock.render.images import write_database
 from tussock.render.mounted_eye import mounted
 from tussock.render.renderer import open_renderer
 from tussock.world.change import CHANGES, Change
@@ -127,7 +128,7 @@ def kinds_of(world: World) -> np.ndarray:
     """The kind of each triangle; empty where it is in no plant."""
     plants = plants_of(world)
     names = np.array([*plants.kinds, ""])
-    return names[np.where(plants.of >= 0, plants.kind[plants.of], -1)]
+    return names[np.where(plants.of >= 0, plants.kind[plants.of].astype(int), -1)]
 
 
 # Every change, in every world
@@ -232,7 +233,7 @@ def test_what_is_removed_and_what_is_kept_is_all(world):
 def test_only_plants_of_the_kinds_that_are_named_are_removed(meadow):
     later = meadow.changed("removed amount=1 kinds=grass,herb")
     assert set(kinds_of(meadow)) - set(kinds_of(later)) == {"grass", "herb"}
-    with pytest.raises(SettingError, match="no plants of the kind 'oak'; it has .*grass"):
+    with pytest.raises(SettingError, match="no plants of the kind 'oak'; it has"):
         meadow.changed("removed amount=1 kinds=oak")
 
 
@@ -243,7 +244,7 @@ def test_a_plant_that_is_moved_keeps_its_shape_and_stands_within_the_distance(wo
     inside = plants.of >= 0
     far = np.hypot(*offset[inside, :2].T)
     assert far.max() <= 0.3 + 1e-6
-    assert 0.1 < np.median(far)
+    assert np.median(far) > 0.1
     first = np.zeros((len(plants), 3))
     first[plants.of[inside]] = offset[inside]
     np.testing.assert_allclose(offset[inside], first[plants.of[inside]], atol=2e-6)  # each as a whole
@@ -615,14 +616,22 @@ def test_a_run_records_the_changed_world(tmp_path, capfd):
     [
         (["--test-change", "remved amount=1"], "did you mean 'removed'"),
         (["--test-change", "removed amount=2"], "from 0 to 1"),
-        (["--test-change", "removed amount=1", "--route-database", "."], "--test-change"),
     ],
 )
-def test_flags_that_cannot_be_are_one_line(flags, words, tmp_path):
-    done = tussock("run", *flags, "--out", str(tmp_path / "run"))
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
+def test_flags_that_cannot_be_are_one_line(flags, words, tmp_path, capfd):
+    code, _, errors = tussock(capfd, "run", *flags, "--out", str(tmp_path / "run"))
+    assert code == 2
+    assert words in errors
+    assert len(errors.strip().splitlines()) == 1
+
+
+def test_images_of_a_route_do_not_change(tiny, tmp_path, capfd):
+    with open_renderer(tiny, EYE) as renderer:
+        write_database(tmp_path / "views", renderer, [(1.0 + 0.1 * k, 1.0, 0.0) for k in range(4)])
+    flags = ["--route-database", str(tmp_path / "views"), "--out", str(tmp_path / "run")]
+    code, _, errors = tussock(capfd, "run", *flags, "--test-change", "removed amount=1")
+    assert code == 2
+    assert "--test-change 'removed amount=1.0': images show the world as it was" in errors
 
 
 def test_headings_are_tested_in_the_changed_world(capfd):

@@ -50,11 +50,13 @@ def _plants_of(world: World) -> PlantGroups:
         )
     of = _loose_pieces(world, ground)
     count = int(of.max(initial=-1)) + 1
-    log.warning(
-        "the plants of this world are not known: its %d separate pieces of connected triangles count as plants, and %d triangles as ground",
-        count,
-        int((of < 0).sum()),
-    )
+    if count:
+        log.warning(
+            "the plants of this world are not known: its %d separate pieces of connected triangles count as plants, the %d triangles of "
+            "wide pieces and of the ground do not",
+            count,
+            int((of < 0).sum()),
+        )
     return PlantGroups(
         of=of, kinds=(PIECE,), kind=np.zeros(count, np.uint8), foot=_feet(world.triangles, of, count).astype(np.float32)
     )
@@ -190,7 +192,7 @@ def ground_heights(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarr
     """Height of the ground that plants stand on at positions (m); nan where there is none. Nothing flies."""
     if isinstance(world.terrain, Terrain):
         return world.terrain.height(xy)
-    if world.ground is None and (plants_of(world).of < 0).any():  # a mesh whose ground agents do not stand on
+    if world.ground is None and (_plants_of(world).of < 0).any():  # a mesh whose ground agents do not stand on
         return _loose_ground(world).height(xy)
     return np.zeros(len(xy))
 
@@ -198,7 +200,7 @@ def ground_heights(world: World, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarr
 @once_per_world
 def _loose_ground(world: World) -> Terrain:
     """The triangles that are in no plant, as a ground."""
-    return Terrain(world.triangles, plants_of(world).of < 0, MAX_SLOPE)
+    return Terrain(world.triangles, _plants_of(world).of < 0, MAX_SLOPE)
 
 
 def spots(
@@ -227,7 +229,7 @@ def appended(
     reflectance: UInt8[np.ndarray, "k 3"],
 ) -> World:
     """A world with more triangles, of one colour each, which are in no plant."""
-    texturing, plants, k = world.texturing, world.plants, len(rgb)
+    texturing, plants, k = world.texturing, _plants_of(world), len(rgb)
     if texturing is not None:
         colours = texturing.colours
         if colours is None:
@@ -241,8 +243,7 @@ def appended(
             uv=np.concatenate([texturing.uv, np.zeros((k, 3, 2), np.float32)]),
             colours=np.concatenate([colours, own]),
         )
-    if plants is not None:
-        plants = dataclasses.replace(plants, of=np.concatenate([plants.of, np.full(k, -1, np.int32)]))
+    plants = dataclasses.replace(plants, of=np.concatenate([plants.of, np.full(k, -1, np.int32)]))
     changed = dataclasses.replace(
         world,
         triangles=np.concatenate([world.triangles, triangles]),
