@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from .obstacles import clearance
 from .plant_parts import hull, sunlit
 from .scene import World
 from .settings import choice, number, settings
@@ -19,7 +20,7 @@ NEAR, FAR = 0.3, 0.5  # m from the middle of the route to that of the object
 RGB = (86, 84, 82)  # grey, as of a box or a post that somebody put there
 SIDES = 16  # of a cylinder
 SINK = 0.02  # m that an object is below the ground, so that it has no gap to a slope
-TRIES = 20  # positions, of which the one farthest from the route is taken
+TRIES = 20  # positions, of which the best one is taken
 
 
 @settings
@@ -37,7 +38,7 @@ class NewObject:
 
     def __call__(self, world: World, rng: np.random.Generator, route: "Route | None" = None) -> World:
         """The changed world."""
-        xy = _place(world, rng, route)
+        xy = _place(world, rng, route, WIDTH * self.amount)
         turn = rng.uniform(-np.pi, np.pi)
         z = float(np.nan_to_num(ground_heights(world, xy[None])[0]))
         sides = SIDES if self.shape == "cylinder" else 4
@@ -52,8 +53,8 @@ class NewObject:
         return appended(world, made.triangles, made.rgb, made.reflectance)
 
 
-def _place(world: World, rng: np.random.Generator, route: "Route | None") -> Float[np.ndarray, "2"]:
-    """Where it stands (m): of several positions that have ground, the one farthest from the route."""
+def _place(world: World, rng: np.random.Generator, route: "Route | None", width: float) -> Float[np.ndarray, "2"]:
+    """Where an object of some width (m) stands (m): of several positions that have ground, the one with most room, off the route."""
     field = world.field
     if route is None:
         xy = np.array(field[:2]) + field.size * rng.uniform(0.25, 0.75, (TRIES, 2))
@@ -64,5 +65,6 @@ def _place(world: World, rng: np.random.Generator, route: "Route | None") -> Flo
         left = np.array([-math.sin(heading), math.cos(heading)])
         xy = np.array([x, y]) + (side * distance)[:, None] * left
         off = np.minimum(route.nearest(xy)[0], NEAR)  # all that are far enough are equal, and the first is taken
+    off = off + np.minimum(clearance(world, xy), width)  # it may stand in a plant where there is no other room
     off = np.where(np.isnan(ground_heights(world, xy)), -1.0, off)
     return xy[off.argmax()]
