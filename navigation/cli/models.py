@@ -15,7 +15,7 @@ from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 
 from ..experiment_fields import MODEL_SUFFIX
-from .options import Command, LearningOptions, ModelOptions, RunOptions, TestOptions
+from .options import ChangeOptions, Command, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
 from .unimported import class_at
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class EvaluateCommand(TestOptions):
+class EvaluateCommand(ChangeOptions):
     """Learn a route, then recover the heading at every grid position near it."""
 
     grid_m: float | None = None

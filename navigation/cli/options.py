@@ -240,7 +240,7 @@ class ModelOptions(LearningOptions):
 
 
 @dataclass
-class TestOptions(ModelOptions):
+class ChangeOptions(ModelOptions):
     """What learns, and what differs in the world when it is tested."""
 
     test_change: Annotated[str | None, tyro.conf.arg(metavar="CHANGE")] = None
@@ -251,7 +251,7 @@ class TestOptions(ModelOptions):
 
 
 @dataclass
-class RunOptions(TestOptions):
+class RunOptions(ChangeOptions):
     """What a model learns, and how an agent walks: everything that decides a run."""
 
     learning_walk_m: float = default(TrainingSetup, "learning_walk")
