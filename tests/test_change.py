@@ -486,6 +486,22 @@ def test_a_change_of_ones_own_is_found_by_its_location_or_a_registered_name(tiny
     assert where in Change.parse("painted amount=1").text_in_files()
 
 
+class Evening:
+    """A change without an amount."""
+
+    def __init__(self, hours: float = 4.0):
+        self.hours = hours
+
+    def __call__(self, world, rng, route):
+        return dataclasses.replace(world, sky_rgb=(10, 10, 40))
+
+
+def test_a_change_needs_no_amount(tiny):
+    later = tiny.changed(f"{__name__}:Evening hours=6 | mown amount=0")
+    assert later.sky_rgb == (10, 10, 40)
+    assert str(Change.parse(f"{__name__}:Evening hours=6")) == f"{__name__}:Evening hours=6.0"
+
+
 # The eye
 
 

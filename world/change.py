@@ -2,7 +2,7 @@
 
     later = World.generate("tussock-field", seed=7).changed("removed amount=0.2 | wind amount=0.5 direction_deg=90", seed=3)
 
-A change is a chain of parts with `|` between them, applied in order. Every part has an `amount`: 0 changes nothing, and 1 is the most.
+A change is a chain of parts with `|` between them, applied in order. A part has an `amount`: 0 changes nothing, and 1 is the most.
 """
 
 import dataclasses
@@ -47,9 +47,9 @@ CHANGES = Registry(
 class Change:
     """A chain of changes of a world. `Change.parse` and `str` are each other's inverse.
 
-    A part is any object with an `amount` from 0 to 1 that returns the changed world: `part(world, rng, route)`. It gets its own generator
-    of random numbers. Two other attributes are optional: `mounted(mount)` returns how the eye is mounted then, and `in_state(state, rng)`
-    returns the part in one state of a walk in which its attribute `states`, a number, says how many there are.
+    A part is any object that returns the changed world: `part(world, rng, route)`. It gets its own generator of random numbers. Other
+    attributes are optional. At an `amount` of 0 it is not called; an amount is from 0 to 1. `mounted(mount)` returns how the eye is mounted
+    then. Where `states`, a number, is over 1, `in_state(state, rng)` returns the part as it is in one of these states.
 
     Attributes:
         parts: Those that are applied, in order.
@@ -61,13 +61,11 @@ class Change:
         if not self.parts:
             raise SettingError("a change without parts; give at least one, such as 'removed amount=0.2'")
         for part in self.parts:
-            amount = getattr(part, "amount", None)
-            if not callable(part) or isinstance(amount, bool) or not isinstance(amount, int | float):
-                raise SettingError(
-                    f"{part!r} is not a change; name a class with an amount whose objects return a changed world"
-                )
-            if not 0 <= amount <= 1:
-                raise SettingError(f"{CHANGES.name_of(type(part))}: amount is {amount}; give a number from 0 to 1")
+            if not callable(part) or isinstance(part, type):
+                raise SettingError(f"{part!r} is not a change; name a class whose objects return a changed world")
+            amount = getattr(part, "amount", 1.0)
+            if isinstance(amount, bool) or not isinstance(amount, int | float) or not 0 <= amount <= 1:
+                raise SettingError(f"{CHANGES.name_of(type(part))}: amount is {amount!r}; give a number from 0 to 1")
 
     @classmethod
     def parse(cls, text: str, *, importing: bool = True) -> "Change":
@@ -101,7 +99,7 @@ class Change:
         """
         changed = world
         for part, rng in self._with_generators(seed):
-            if part.amount == 0:
+            if getattr(part, "amount", 1.0) == 0:
                 continue
             if getattr(part, "states", 1) > 1:
                 part = part.in_state(state, rng)
