@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from tussock.world.change import Change, as_change
 from tussock.world.errors import SettingError
 from tussock.world.progress import Progress, no_progress, printed
-from tussock.world.settings import converted, instance_of, number, settings
+from tussock.world.settings import converted, instance_of, number, settings, whole
 from tussock.world.specs import Spec, takes
 
 from .body import Body
+from .changed_world import changed_views, with_views
 from .devices import check_device, chosen_device
 from .displacement import Displacement
 from .experiment_fields import as_encoding, as_model, as_navigator, check_matches, check_start
@@ -64,6 +66,8 @@ class Experiment(Surroundings):
         release_direction: In which direction of the world from there (rad, counter-clockwise from east).
         displacement: Where the agent is carried to the side of the route.
         stopping: When the walk ends.
+        test_change: What differs in the world when the agent walks: "removed amount=0.2" (see `World.changed`). None: nothing.
+        change_seed: Of what is drawn for this change; None means `seed`.
         device: Where the model learns and scans: "cpu", "cuda", another device of torch, or "auto": a GPU, if any.
     """
 
@@ -78,6 +82,8 @@ class Experiment(Surroundings):
     release_direction: float = number(0.0, unit="rad")
     displacement: Displacement = instance_of(Displacement, attrs.Factory(Displacement), "a Displacement")
     stopping: StoppingRules = instance_of(StoppingRules, attrs.Factory(StoppingRules), "StoppingRules")
+    test_change: Change | None = converted(default=None, converter=as_change)
+    change_seed: int | None = whole(None, low=0, optional=True)
     device: str = attrs.field(default="cpu", converter=chosen_device)
 
     def __attrs_post_init__(self):
@@ -229,16 +235,16 @@ class Experiment(Surroundings):
 
     @contextmanager
     def opened(self, progress: Progress | None = None) -> Iterator["TrainedNavigator"]:
-        """Open the world, find the route, and let the navigator learn it; the renderer is closed with the block."""
+        """Open the world, find the route, and let the navigator learn it, then change the world; the renderer is closed with the block."""
         progress = printed(progress, "learning", "views")
         from .walker import check_inside
 
         world, route = self.open_world_and_route()
         check_inside(self.start(route), world)  # before the work begins
-        with self.open_renderer(world) as renderer:
+        with self.open_renderer(world) as renderer, changed_views(self, renderer, route) as views:
             device = "" if self.device == "cpu" else f", device: {self.device}"
             log.info(f"renderer: {renderer.backend}{device}")
-            yield self.train(renderer, route, progress)
+            yield with_views(self.train(renderer, route, progress), views)
 
     def run(self, progress: Progress | None = None) -> "Trajectory":
         """Learn the route and walk it.

@@ -76,5 +76,9 @@ def check_start(experiment: Any) -> None:
         raise SettingError(
             f"--collisions {experiment.body.collisions}: obstacles are known at one height; fly with --altitude-m, or leave it out"
         )
+    if experiment.route_database is not None and experiment.test_change is not None:
+        raise SettingError(
+            f"--test-change {str(experiment.test_change)!r}: images show the world as it was when they were taken; leave it out"
+        )
     if experiment.route_database is not None and experiment.body.collisions != "pass":
         raise SettingError(f"--collisions {experiment.body.collisions}: images have no obstacles; leave it out")

@@ -50,7 +50,8 @@ VIEW_SETTINGS = (  # decide with these the views that are learned
 )  # fmt: skip
 WALK_SETTINGS = (  # decide the walk alone, not what is learned before
     "step_m", "offset_m", "heading_noise_deg", "collisions", "body_radius_m", "release_m", "release_deg",
-    "displace_at", "displace_m", "on_lost", "waypoint_m", "put_back_ahead_m", "arrive_m", "lost_m", "patience_m", "max_steps",
+    "displace_at", "displace_m", "test_change", "change_seed",
+    "on_lost", "waypoint_m", "put_back_ahead_m", "arrive_m", "lost_m", "patience_m", "max_steps",
 )  # fmt: skip
 
 WALK_FIELDS = tuple(
@@ -141,6 +142,8 @@ def _deciding(experiment: Experiment) -> dict[str, Any]:
     model = experiment.model
     kept["model"] = content_of(model) if isinstance(model, Path) else _in_files(model, MODELS)
     kept["navigator"] = _in_files(experiment.navigator, NAVIGATORS)
+    if experiment.test_change is not None:
+        kept["test_change"] = experiment.test_change.text_in_files()
     if experiment.eye.mask is not None:
         kept["mask"] = str(experiment.eye.mask)  # its pixels, wherever they were read from
     if experiment.eye.compound is not None:

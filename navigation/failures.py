@@ -10,7 +10,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from tussock.render.changed_views import ChangedViews
 from tussock.render.images.source import DatabaseViews
+from tussock.render.mounted_eye import mounted
 from tussock.render.occlusion import covered_within
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
@@ -221,6 +223,8 @@ class Diagnostics:
             return [None] * len(steps)
         world, eye = self._renderer.world, self._renderer.eye
         poses = np.array([(*step.pose, step.height + eye.z, *(step.tilt or (0.0, 0.0))) for step in steps])
+        if isinstance(self._renderer, ChangedViews):
+            poses = mounted(poses, self._renderer.mount)
         return covered_within(world, eye, poses, OCCLUDER_DISTANCE).tolist()
 
     def _nearest(self, steps: Sequence[Step]) -> list[float] | list[None]:

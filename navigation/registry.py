@@ -12,6 +12,7 @@ REGISTRIES = {
     "encodings": "tussock.navigation.encoding:STEPS",
     "navigators": "tussock.navigation.steering:NAVIGATORS",
     "worlds": "tussock.world.params:WORLDS",
+    "changes": "tussock.world.change:CHANGES",
     "protocols": "tussock.navigation.studies.protocols:PROTOCOLS",
 }
 
@@ -20,7 +21,7 @@ def register(group: str, name: str, target: Any) -> None:
     """Enter something of your own under a name, for this process; it then works wherever the built-in ones do.
 
     Args:
-        group: "models", "encodings", "navigators", "worlds" or "protocols".
+        group: "models", "encodings", "navigators", "worlds", "changes" or "protocols".
         name: By which it is known, on the command line too.
         target: The class; for protocols and worlds see docs/extending.md.
 

@@ -6,6 +6,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from tussock.world.change import Change
 from tussock.world.specs import Spec
 
 # Type of each setting, in the order of a table's columns, and the field of `Experiment` that it is: of itself, or, after a point, of
@@ -73,6 +74,8 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "displace_m": (float, "displacement.left"),
     "scan_deg": (float | None, ""),
     "scan_about_deg": (float | None, ""),
+    "test_change": (str | None, "test_change"),
+    "change_seed": (int | None, "change_seed"),
     "on_lost": (str, ""),
     "waypoint_m": (float, "stopping.waypoint_spacing"),
     "put_back_ahead_m": (float | None, "stopping.put_back_ahead"),
@@ -106,7 +109,7 @@ def as_field(name: str, value: Any) -> Any:
 
 def as_setting(name: str, value: Any) -> Any:
     """A field as a setting of this name: an angle in degrees, a path or a spec as text."""
-    if isinstance(value, Path | Spec):
+    if isinstance(value, Path | Spec | Change):
         return str(value)
     return degrees(value) if name.endswith("_deg") and value is not None else value
 

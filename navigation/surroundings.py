@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
     from tussock.render.renderer import Renderer
+    from tussock.world.eye_change import EyeMount
     from tussock.world.flight import Flight
     from tussock.world.geometry import Route
     from tussock.world.scene import World
@@ -278,8 +279,13 @@ class Surroundings:
         world = self.open_world()
         return world, self.open_route(world)
 
-    def open_renderer(self, world: "World") -> "Renderer":
-        """A renderer of the world for the eye, or the views of the databases; use it in a `with` statement."""
+    def open_renderer(self, world: "World", *, mount: "EyeMount | None" = None) -> "Renderer":
+        """A renderer of the world for the eye, or the views of the databases; use it in a `with` statement.
+
+        Args:
+            world: The world.
+            mount: How the eye is mounted, if otherwise than it was.
+        """
         if self.route_database is not None:
             from tussock.render.images.source import open_views
 
@@ -289,6 +295,10 @@ class Surroundings:
         if self.posture.gaze == "body" and world.terrain is None:
             _remark_on_flat_ground()
         renderer = open_renderer(world, self.eye, self.renderer, threads=self.threads)
+        if mount is not None and mount != type(mount)():
+            from tussock.render.mounted_eye import MountedEye
+
+            renderer = MountedEye(renderer, mount)
         if not self.posture.tilts(world):
             return renderer
         from tussock.render.tilted_eye import TiltedEye

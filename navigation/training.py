@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
+from tussock.render.changed_views import ChangedViews
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.render.tilted_eye import TiltedEye
@@ -186,8 +187,8 @@ def _remark_on_learning_walk() -> None:
 
 
 def training_source(renderer: Renderer) -> Renderer:
-    """What draws the views to learn: the renderer, or what image databases and carried eyes have for this."""
-    return renderer.training if isinstance(renderer, DatabaseViews | TiltedEye) else renderer
+    """What draws the views to learn: the renderer, or what image databases, carried eyes and changed worlds have for this."""
+    return renderer.training if isinstance(renderer, DatabaseViews | TiltedEye | ChangedViews) else renderer
 
 
 def training_views(

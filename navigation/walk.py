@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
+from tussock.render.changed_views import at_step
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.render.tilted_eye import TiltedEye
@@ -110,11 +111,12 @@ class Walk:
         """What the agents whose walk goes on perceive."""
         walking = self.walking
         poses = np.array([agent.pose for agent in walking])
-        if isinstance(self.renderer, TiltedEye):
-            poses = self.renderer.full_poses(poses)
+        renderer = at_step(self.renderer, walking[0].index)
+        if isinstance(renderer, TiltedEye):
+            poses = renderer.full_poses(poses)
             for agent, (pitch, roll) in zip(walking, poses[:, 4:].tolist(), strict=True):
                 agent.tilt = pitch, roll
-        views = self.renderer.render(poses)
+        views = renderer.render(poses)
         known = self.renderer.known(poses) if isinstance(self.renderer, DatabaseViews) else None
         self._seen = views, self.encoding(views, known)
         compass, odometry = np.array([agent.sense() for agent in walking]).T

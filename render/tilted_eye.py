@@ -15,6 +15,7 @@ from tussock.world.errors import SettingError
 from tussock.world.full_pose import slopes_under
 from tussock.world.geometry import rounded
 
+from .changed_views import at_step
 from .poses import AnyPoses, Views, as_poses, poses_of_eye
 from .posture import Posture
 from .renderer import Renderer
@@ -76,7 +77,7 @@ class TiltedEye:
 
 def check_level(renderer: Renderer) -> None:
     """Refuse an eye that pitches or rolls where views are drawn once and then turned as images. Raises SettingError."""
-    if isinstance(renderer, TiltedEye):
+    if isinstance(at_step(renderer, 0), TiltedEye):
         raise SettingError(
             "headings are tested by turning views, and an eye that pitches or rolls would see something else after a turn: leave out "
             "gaze, pitch_noise_deg and roll_noise_deg; walks take them"

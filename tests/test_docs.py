@@ -17,7 +17,11 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 
 @pytest.mark.parametrize(
-    "page", ["eyes", *(pytest.param(page, marks=pytest.mark.slow) for page in ("environment", "failures", "models"))]
+    "page",
+    [
+        "eyes",
+        *(pytest.param(page, marks=pytest.mark.slow) for page in ("changes", "environment", "failures", "models")),
+    ],
 )
 def test_the_snippets_of_a_page_run(page, tmp_path):
     snippets = re.findall(r"```python\n(.+?)```", (DOCS / f"{page}.md").read_text(), flags=re.DOTALL)

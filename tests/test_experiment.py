@@ -289,6 +289,7 @@ OTHER: dict[str, Any] = {
     "goal_walk_m": 1.0, "goal_turns": 3.0,
     "goal_views": 9, "goal_spread_deg": 20.0, "goal_only": True, "collisions": "slide", "body_radius_m": 0.01,
     "senses": "ant", "release_m": 1.0, "release_deg": 30.0, "displace_at": 0.4, "displace_m": 0.3,
+    "test_change": "removed amount=0.2", "change_seed": 5,
     "gaze": "body", "body_length_m": 0.02, "pitch_noise_deg": 3.0, "roll_noise_deg": 3.0,
     "device": "cpu:0",
     "model": "infomax", "threads": 1, "step_m": 0.1, "offset_m": 0.1, "heading_noise_deg": 5.0, "scan_deg": 90.0, "scan_about_deg": 10.0,

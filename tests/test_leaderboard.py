@@ -116,6 +116,7 @@ def test_the_digest_depends_on_every_setting_of_a_run(tmp_path):
         "side": "left", "overlap_deg": 20.0, "eye": "ant", "mask": str(tmp_path / "mask.png"),
         "goal_walk_m": 1.0, "goal_views": 9, "goal_turns": 3.0, "goal_spread_deg": 20.0, "collisions": "slide", "body_radius_m": 0.01,
         "senses": "ant", "release_deg": 30.0, "displace_at": 0.4, "displace_m": 0.3,
+        "test_change": "removed amount=0.2", "change_seed": 5,
         "gaze": "body", "body_length_m": 0.02, "pitch_noise_deg": 3.0, "roll_noise_deg": 3.0,
     }  # fmt: skip
     assert set(changes) == set(TYPES) - set(OF_ENTRY) - set(ROUTE_SETTINGS) - {

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,6 +20,10 @@ from .plant_groups import PlantGroups
 from .settings import MAX_COORDINATE, RGB
 from .terrain import MAX_SLOPE, Part, Terrain
 from .textures import Texturing
+
+if TYPE_CHECKING:
+    from .change import Change
+    from .geometry import Route
 
 Made = TypeVar("Made")
 
@@ -176,6 +180,22 @@ class World:
     def flown(self, flight: Flight) -> "World":
         """The same world, where agents fly: they move on a surface in the air, and pass over and under what it does not cross."""
         return dataclasses.replace(self, terrain=flight)
+
+    def changed(self, change: "Change | str", seed: int = 0, route: "Route | None" = None) -> "World":
+        """The same world after a change, such as plants removed or wind (docs/changes.md). Where nothing changes, it is this world.
+
+        Args:
+            change: What changes: "removed amount=0.2", "wind amount=0.5 direction_deg=90", or several with `|` between them. An `amount` is
+                from 0, which changes nothing, to 1.
+            seed: Of what is drawn, such as which plants. The same seed gives the same bytes.
+            route: Through the world: a new object then stands next to it.
+
+        Raises:
+            SettingError: For an unknown change or parameter, an invalid value, and a change of plants where there are none.
+        """
+        from .change import Change
+
+        return (Change.parse(change) if isinstance(change, str) else change).apply(self, seed, route)
 
     def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Height of what agents stand or fly on at positions (both m): 0, or that of the terrain; nan where it has no ground."""

@@ -228,7 +228,7 @@ def _height_in(triangles: Float[np.ndarray, "n 3 3"], xy: Float[np.ndarray, "n 2
     return np.where(inside, height, np.nan)
 
 
-def _pieces(corners: Float[np.ndarray, "n 3 3"]) -> Int64[np.ndarray, " n"]:
+def pieces(corners: Float[np.ndarray, "n 3 3"]) -> Int64[np.ndarray, " n"]:
     """The number of the piece of each triangle; triangles that share a corner are in one piece."""
     # They take half a second, which a flat world need not wait for.
     import trimesh
@@ -246,7 +246,7 @@ def _pieces(corners: Float[np.ndarray, "n 3 3"]) -> Int64[np.ndarray, " n"]:
 
 def _heights_of_pieces(corners: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, " n"]:
     """Height, from its lowest to its highest corner, of the piece of each triangle (m)."""
-    piece = _pieces(corners)
+    piece = pieces(corners)
     n = int(piece.max(initial=-1)) + 1
     low, high = np.full(n, np.inf), np.full(n, -np.inf)
     np.minimum.at(low, piece, corners[..., 2].min(axis=1))
@@ -260,7 +260,7 @@ def _is_in_large_piece(
     """Which walkable triangles are in a piece that is large and faces up; see the top of this module."""
     if len(corners) == 0:
         return np.empty(0, dtype=bool)
-    piece = _pieces(corners)
+    piece = pieces(corners)
     area = np.minimum(np.bincount(piece, np.abs(up)), field_area)
     large = area >= MIN_SHARE * area.max()
     faces_up = large & (np.bincount(piece, up) >= 0)

@@ -2,13 +2,10 @@
 Plants removed
 ==============
 
-The route is learned, then 30 and 60 % of all triangles of the world are taken away: does the agent still find home?
+The route is learned, then 30 and 60 % of all plants of the world are taken away: does the agent still find home?
 """
 
-import dataclasses
-
 import matplotlib.pyplot as plt
-import numpy as np
 
 from tussock import Encoding, PerfectMemory, Scan, Walk, World, generate_route, open_renderer, train, training_poses
 
@@ -18,8 +15,7 @@ encoding = Encoding.named("edges", resize=6)
 with open_renderer(world) as renderer:
     trained = train(PerfectMemory(), encoding, renderer, training_poses(route, spacing=0.04, learning_walk=0.2))
 for share in (0.0, 0.3, 0.6):
-    kept = np.random.default_rng(0).random(len(world.triangles)) >= share
-    thinned = dataclasses.replace(world, triangles=world.triangles[kept], rgb=world.rgb[kept])
+    thinned = world.changed(f"removed amount={share}", seed=0)
     with open_renderer(thinned) as renderer:
         walk = Walk(renderer=renderer, encoding=encoding, route=route, starts=[route.start.moved(0.0, 0.1)])
         steps = [step for (step,) in walk.steps(Scan(model=trained.model))]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import changes
 import comparison
 import descriptions
 import eyes
@@ -61,7 +62,8 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
-    comparison.MEASUREMENTS
+    changes.MEASUREMENTS
+    | comparison.MEASUREMENTS
     | descriptions.MEASUREMENTS
     | eyes.MEASUREMENTS
     | light.MEASUREMENTS

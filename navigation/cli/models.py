@@ -15,7 +15,7 @@ from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 
 from ..experiment_fields import MODEL_SUFFIX
-from .options import Command, LearningOptions, ModelOptions, RunOptions
+from .options import ChangeOptions, Command, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
 from .unimported import class_at
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class EvaluateCommand(ModelOptions):
+class EvaluateCommand(ChangeOptions):
     """Learn a route, then recover the heading at every grid position near it."""
 
     grid_m: float | None = None
@@ -40,6 +40,7 @@ class EvaluateCommand(ModelOptions):
     """Errors are also given of those positions alone that have room to stand: no obstacle is nearer than this."""
 
     def run(self) -> dict[str, Any]:
+        from ..changed_world import changed_views, check_no_gusts
         from ..evaluation import heading_errors
         from ..tested_poses import poses_to_test, route_views_of
 
@@ -49,6 +50,7 @@ class EvaluateCommand(ModelOptions):
         if not (math.isfinite(self.clearance_m) and self.clearance_m >= 0):
             raise SettingError(f"--clearance-m {self.clearance_m:g}: give a finite distance, 0 or more")
         experiment = self.experiment()
+        check_no_gusts(experiment)
         world, route = experiment.open_world_and_route()
         positions = poses_to_test(experiment, world, route, grid=self.grid_m, within=self.within_m)
         with experiment.open_renderer(world) as renderer:
@@ -56,11 +58,12 @@ class EvaluateCommand(ModelOptions):
             with progress("learning", "views") as report:
                 trained = experiment.train(renderer, route, report)
             assert trained.model is not None
-            model, encoding = trained.model.model, experiment.encoding
+            model, encoding, scan = trained.model.model, experiment.encoding, math.radians(self.scan_deg)
             views = route_views_of(experiment, route)
-            with progress("recovering headings", "positions") as report:
-                scan = math.radians(self.scan_deg)
-                errors = heading_errors(model, encoding, renderer, views, positions, scan=scan, progress=report)
+            tested = changed_views(experiment, renderer, route)
+            with tested as seen, progress("recovering headings", "positions") as report:
+                errors = heading_errors(model, encoding, seen, views, positions, scan=scan, progress=report)
+                world = seen.world
         # From the route itself: the line through its views cuts corners.
         errors = dataclasses.replace(errors, distances=route.nearest(errors.positions)[0])
         return {

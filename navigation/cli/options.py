@@ -245,7 +245,18 @@ class ModelOptions(LearningOptions):
 
 
 @dataclass
-class RunOptions(ModelOptions):
+class ChangeOptions(ModelOptions):
+    """What learns, and what differs in the world when it is tested."""
+
+    test_change: Annotated[str | None, tyro.conf.arg(metavar="CHANGE")] = None
+    """What differs in the world after learning: 'removed amount=0.2', 'wind amount=0.5 direction_deg=90', moved, added, grown, mown,
+    object, eye-raised or eye-turned (docs/changes.md); several with | between them. Default: nothing."""
+    change_seed: int | None = None
+    """Seed of this change. Default: --seed."""
+
+
+@dataclass
+class RunOptions(ChangeOptions):
     """What a model learns, and how an agent walks: everything that decides a run."""
 
     learning_walk_m: float = default(TrainingSetup, "learning_walk")

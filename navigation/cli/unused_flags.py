@@ -22,6 +22,7 @@ _NEEDED = {
     "put_back_ahead_m": "on_lost",
     "body_length_m": "gaze",
     "overlap_deg": "side",
+    "change_seed": "test_change",
 }
 _OF_THE_ROUTE = ("spacing_m", "every", "parallel_views", "learning_walk_m")  # what --goal-only makes useless
 

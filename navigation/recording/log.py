@@ -16,6 +16,7 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float
 
+from tussock.render.changed_views import at_step
 from tussock.render.images.source import DatabaseViews
 from tussock.render.renderer import Renderer
 from tussock.render.tilted_eye import TiltedEye
@@ -200,7 +201,7 @@ class Recording:
         names = {"deviation/m": "deviation from the route (m)", "error/degrees": "heading error (degrees)"}
         for (entity, name), colour in zip(names.items(), (PATH_COLOUR, MATCH_COLOUR), strict=True):
             self._log(entity, rr.SeriesLines(names=name, colors=colour), static=True)
-        if isinstance(self._renderer, TiltedEye):
+        if isinstance(at_step(self._renderer, 0), TiltedEye):
             self._log(TILT, rr.SeriesLines(colors=[PATH_COLOUR, ROUTE_COLOUR], names=["pitch", "roll"]), static=True)
         self._log(GUIDES, rr.SeriesLines(colors=[GUIDE_COLOUR] * 2, names=["45 left", "45 right"]), static=True)
         for entity, colour in MARKS.items():

@@ -144,7 +144,8 @@ def _image_from_above(world: World, part: Bounds) -> UInt8[np.ndarray, "h w 4"]:
     """Part of a world from above as an image."""
     low, high = world.triangles[..., :2].min(axis=1), world.triangles[..., :2].max(axis=1)
     within = (low <= part[2:]).all(axis=1) & (high >= part[:2]).all(axis=1)
-    visible = dataclasses.replace(world, triangles=world.triangles[within], rgb=world.rgb[within], texturing=None)
+    only_colours = {"texturing": None, "reflectance": None, "plants": None}
+    visible = dataclasses.replace(world, triangles=world.triangles[within], rgb=world.rgb[within], **only_colours)
     across, up = part.x_max - part.x_min, part.y_max - part.y_min
     figure = Figure(figsize=(across / max(across, up), up / max(across, up)), dpi=MAP_PIXELS)
     drawn = FigureCanvasAgg(figure)

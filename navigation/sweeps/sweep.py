@@ -199,12 +199,12 @@ def _tasks(
 
 
 def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
-    """Which runs walk together, as keys: runs of one trained model, so many that all workers are busy. One world after the other."""
+    """Which runs walk together, as keys: runs of one model in one world, so many that all workers are busy. One world after the other."""
     groups: dict[tuple[str, ...], list[str]] = {}
     first: dict[str, int] = {}  # when a world, views and a model are first needed
     keys = Keys()
     for key, run in runs.items():
-        names = keys.shared(run)
+        names = *keys.shared(run), _world_of_walk(run)
         groups.setdefault(names, []).append(key)
         for name in names:
             first.setdefault(name, len(first))
@@ -213,6 +213,12 @@ def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
         size = min(_most_together(runs[group[0]].eye), enough)
         parts += [part.tolist() for part in np.array_split(group, max(1, round(len(group) / size)))]
     return parts
+
+
+def _world_of_walk(run: Experiment) -> str:
+    """What the worlds of runs differ in that have learned in the same one."""
+    change = run.test_change
+    return "change-" + ("" if change is None else f"{change.text_in_files()} {run.seed} {run.change_seed}")
 
 
 def _most_together(eye: Eye) -> int:

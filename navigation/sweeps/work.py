@@ -14,6 +14,7 @@ from tussock.world.geometry import Route
 from tussock.world.scene import World
 from tussock.world.specs import Spec
 
+from ..changed_world import in_changed_world
 from ..experiment import Experiment, TrainedNavigator, steps_of
 from ..failures import Cause
 from ..registry import registry
@@ -65,7 +66,7 @@ class Registrations(WorkerPlugin):
 
     def __init__(self) -> None:
         self.registered = {
-            group: registry(group).registered for group in ("models", "encodings", "navigators", "worlds")
+            group: registry(group).registered for group in ("models", "encodings", "navigators", "worlds", "changes")
         }
 
     def setup(self, worker: Any) -> None:
@@ -100,7 +101,7 @@ def walk(
     """Walk side by side, as experiments that have learned the same say.
 
     Args:
-        experiments: One for each walk.
+        experiments: One for each walk; the world has the same changes for all of them.
         trained: What they have learned.
         columns: See `Sweep.columns`.
 
@@ -108,7 +109,8 @@ def walk(
         The results of each run, or its error.
     """
     try:
-        return _walk(experiments, trained, columns)
+        with in_changed_world(experiments[0], trained) as there:
+            return _walk(experiments, there, columns)
     except Exception as error:
         if len(experiments) > 1:  # one of them is in the way of the others
             return [result for each in experiments for result in walk([each], trained, columns)]

@@ -10,10 +10,12 @@ import pandas as pd
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
+from tussock.render.changed_views import at_step
 from tussock.render.renderer import Renderer
 from tussock.world.errors import SettingError
 from tussock.world.specs import Spec
 
+from ..changed_world import changed_views
 from ..experiment import Experiment
 from ..experiment_settings import TYPES, experiment_of
 from ..failures import Cause, Diagnosis
@@ -56,11 +58,12 @@ def _draw(row: dict[str, Any], steps: pd.DataFrame, shown: int) -> Iterator[Figu
     experiment, step = experiment_of({name: row.get(name) for name in TYPES}), steps.iloc[shown]
     pose = np.array([[step["x_m"], step["y_m"], np.radians(step["heading_deg"])]])
     world, route = experiment.open_world_and_route()
-    with experiment.open_renderer(world) as renderer:
-        view, match = renderer.eye.hide(renderer.render(pose))[0], None
+    with experiment.open_renderer(world) as learned_in, changed_views(experiment, learned_in, route) as renderer:
+        view, match = renderer.eye.hide(at_step(renderer, shown).render(pose))[0], None
         if isinstance(experiment.model, Spec) and not pd.isna(step["match"]):
             learned = learned_pose(int(step["match"]), experiment, renderer, experiment.training_poses(world, route))
             match = renderer.eye.hide(training_source(renderer).render(learned))[0]
+        world = renderer.world
     yield walk_map(world, route, steps, shown)
     yield view_and_match(view, match)
 

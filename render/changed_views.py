@@ -1,0 +1,58 @@
+"""Views of a world that has changed since its views were learned."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tussock.world.eye_change import EyeMount
+
+from .poses import AnyPoses, Views
+from .renderer import Renderer
+
+
+class ChangedViews:
+    """A renderer of a changed world, which may differ from step to step of a walk, a `Renderer`.
+
+    Args:
+        renderers: Of the states of the world; at each step of a walk, one of them is drawn.
+        training: Draws the views that are learned: of the world as it was.
+        seed: Of which state a step has.
+        mount: How the eye is mounted; the renderers draw its views.
+
+    Attributes:
+        training: Draws the views that are learned.
+        mount: How the eye is mounted.
+        world: The world in its first state. Obstacles and recordings are of this one.
+    """
+
+    def __init__(self, renderers: Sequence[Renderer], training: Renderer, seed: int = 0, mount: EyeMount | None = None):
+        self._renderers, self.training, self._seed = tuple(renderers), training, seed
+        self.mount = mount or EyeMount()
+        first = self._renderers[0]
+        self.world, self.eye, self.backend = first.world, first.eye, first.backend
+
+    def at_step(self, step: int) -> Renderer:
+        """The renderer of the state of the world at a step of a walk."""
+        if len(self._renderers) == 1:
+            return self._renderers[0]
+        return self._renderers[int(np.random.default_rng([self._seed, step]).integers(len(self._renderers)))]
+
+    def render(self, poses: AnyPoses) -> Views:
+        """See `Renderer.render`; in the first state."""
+        return self._renderers[0].render(poses)
+
+    def close(self) -> None:
+        """Close the renderers of the changed world."""
+        for renderer in self._renderers:
+            renderer.close()
+
+    def __enter__(self) -> "ChangedViews":
+        return self
+
+    def __exit__(self, kind, error, traceback) -> None:
+        self.close()
+
+
+def at_step(renderer: Renderer, step: int) -> Renderer:
+    """What draws the views at a step of a walk: the renderer, or that of the state of a changed world."""
+    return renderer.at_step(step) if isinstance(renderer, ChangedViews) else renderer
