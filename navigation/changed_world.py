@@ -28,14 +28,14 @@ def changed_views(experiment: "Experiment", renderer: "Renderer", route: "Route"
     if change is None:
         yield renderer
         return
-    from tussock.render.changed_views import ChangedViews
+    from tussock.render.changed_views import ChangedViews, changed_world
 
     seed = experiment.seed if experiment.change_seed is None else experiment.change_seed
     training = getattr(renderer, "training", renderer)
     with ExitStack() as opened:
         states = [
             opened.enter_context(
-                experiment.open_renderer(change.apply(renderer.world, seed, route, state), mount=change.mount)
+                experiment.open_renderer(changed_world(renderer.world, change, seed, route, state), mount=change.mount)
             )
             for state in range(change.states)
         ]

@@ -4,10 +4,41 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tussock.world.change import Change
+from tussock.world.errors import SettingError
 from tussock.world.eye_change import EyeMount
+from tussock.world.geometry import Route
+from tussock.world.scene import World
 
+from .lighting import lit
 from .poses import AnyPoses, Views
 from .renderer import Renderer
+
+
+def changed_world(world: World, change: Change, seed: int = 0, route: Route | None = None, state: int = 0) -> World:
+    """The world after a change. Of a lit world, the shapes change first; then the light, which may have changed, is put on it anew.
+
+    Args:
+        world: The world as it was.
+        change: What changes.
+        seed: Of what is drawn.
+        route: Through the world.
+        state: See `Change.apply`.
+
+    Raises:
+        SettingError: Where the sun is to change and the world has none, or where its light is of a file.
+    """
+    if world.light is None:
+        if change.of_light:
+            raise SettingError(
+                f"{str(change)!r} changes the sun, and this world has none: give --light, such as --light sun"
+            )
+        return change.apply(world, seed, route, state)
+    before, light = world.unlit or world, change.lit(world.light)
+    changed = change.apply(before, seed, route, state)
+    if changed is before and light == world.light:
+        return world
+    return lit(changed, light)
 
 
 class ChangedViews:

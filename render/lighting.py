@@ -33,7 +33,7 @@ def lit(world: World, light: Light) -> World:
     Raises SettingError for a world that is lit already.
     """
     if world.light is not None:
-        raise SettingError("the world is lit by a sun already; light the world that it was made of")
+        raise SettingError("the world is lit by a sun already; light the world that it was made of (World.unlit)")
     reflectance = world.rgb if world.reflectance is None else world.reflectance
     brightness = np.rint(255 * to_display(light_on_triangles(world, light))).astype(np.uint8)
     rgb = product_table()[reflectance, brightness[:, None]]

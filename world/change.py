@@ -21,6 +21,7 @@ from .specs import format_spec
 
 if TYPE_CHECKING:
     from .geometry import Route
+    from .light import Light
     from .scene import World
 
 CHANGES = Registry(
@@ -36,6 +37,8 @@ CHANGES = Registry(
             "mown": "mowing:Mown",
             "wind": "wind:Wind",
             "object": "new_object:NewObject",
+            "sun": "light_change:SunMoved",
+            "clouds": "light_change:Clouded",
             "eye-raised": "eye_change:EyeRaised",
             "eye-turned": "eye_change:EyeTurned",
         }.items()
@@ -49,7 +52,8 @@ class Change:
 
     A part is any object that returns the changed world: `part(world, rng, route)`. It gets its own generator of random numbers. Other
     attributes are optional. At an `amount` of 0 it is not called; an amount is from 0 to 1. `mounted(mount)` returns how the eye is mounted
-    then. Where `states`, a number, is over 1, `in_state(state, rng)` returns the part as it is in one of these states.
+    then, and `lit(light)` the light. Where `states`, a number, is over 1, `in_state(state, rng)` returns the part as it is in one of these
+    states.
 
     Attributes:
         parts: Those that are applied, in order.
@@ -108,6 +112,10 @@ class Change:
                 raise SettingError(f"{self._name(part)} gives an object of type {type(changed).__name__}, not a World")
         if changed is world:
             return world
+        if world.light is not None:
+            raise SettingError(
+                "the world is lit by a sun already, and its shadows would stay: change it first, as in lit(world.changed(...), light)"
+            )
         changes = [*world.origin.get("changes", []), {"change": self.text_in_files(), "seed": int(seed)}]
         return dataclasses.replace(changed, origin=world.origin | {"changes": changes})
 
@@ -131,6 +139,17 @@ class Change:
         for part in self.parts:
             mount = getattr(part, "mounted", lambda same: same)(mount)
         return mount
+
+    @property
+    def of_light(self) -> bool:
+        """Whether it changes the sun or the sky."""
+        return any(hasattr(part, "lit") for part in self.parts)
+
+    def lit(self, light: "Light") -> "Light":
+        """The light after the change. Raises SettingError at night."""
+        for part in self.parts:
+            light = getattr(part, "lit", lambda same: same)(light)
+        return light
 
     @property
     def states(self) -> int:

@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby, product
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,11 +133,13 @@ class Benchmark:
 
     def asked(self) -> list[Asked]:
         """What every run asks, in their order."""
-        names = [("", "", self.noises_deg), *((each.name, each.world, [each.noise_deg]) for each in self.conditions)]
+        parts = [("", "", self.noises_deg), *((each.name, each.world, (each.noise_deg,)) for each in self.conditions)]
         return [
             Asked(condition, f"{world} {parameters}".strip(), seed, noise, displacement)
-            for condition, parameters, noises in names
-            for (world, seed), noise, displacement in product(self.worlds, noises, self.displacements)
+            for condition, parameters, noises in parts
+            for world, seed in self.worlds
+            for noise in noises
+            for displacement in self.displacements
         ]
 
     def chain(self, encoding: str = ENCODING) -> str:

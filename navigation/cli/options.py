@@ -250,7 +250,7 @@ class ChangeOptions(ModelOptions):
 
     test_change: Annotated[str | None, tyro.conf.arg(metavar="CHANGE")] = None
     """What differs in the world after learning: 'removed amount=0.2', 'wind amount=0.5 direction_deg=90', moved, added, grown, mown,
-    object, eye-raised or eye-turned (docs/changes.md); several with | between them. Default: nothing."""
+    object, sun, clouds, eye-raised or eye-turned (docs/changes.md); several with | between them. Default: nothing."""
     change_seed: int | None = None
     """Seed of this change. Default: --seed."""
 
