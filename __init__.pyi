@@ -57,6 +57,7 @@ from .render import Posture as Posture
 from .render import Renderer as Renderer
 from .render import compound_eye as compound_eye
 from .render import draw_ommatidia as draw_ommatidia
+from .render import lit as lit
 from .render import open_renderer as open_renderer
 from .world import Bounds as Bounds
 from .world import DiskFullError as DiskFullError
@@ -64,6 +65,7 @@ from .world import FileError as FileError
 from .world import FullPose as FullPose
 from .world import Ground as Ground
 from .world import InputError as InputError
+from .world import Light as Light
 from .world import MeshReading as MeshReading
 from .world import MissingDependencyError as MissingDependencyError
 from .world import Pose as Pose

@@ -6,10 +6,10 @@ import pytest
 import worlds
 
 from tussock.navigation import Encoding
-from tussock.render import Eye, compound_eye, open_renderer
+from tussock.render import Eye, compound_eye, lit, open_renderer
 from tussock.render.images.writing import Grid, published_grid_area, write_database
 from tussock.render.ommatidia import named_eye
-from tussock.world import InputError
+from tussock.world import InputError, Light
 
 SHAPES = [(720, 150, 1), (90, 25, 4), (90, 25, 1), (120, 25, 4)]
 
@@ -76,6 +76,23 @@ def test_view_of_a_tilted_eye(measure):
             items=32,
             unit="ms a view",
         )
+
+
+def test_view_with_shadows(measure):
+    name, world = worlds.everyday()
+    poses, bright = worlds.poses_in(world, 32), lit(world, Light())
+    with open_renderer(bright, Eye(), "cpu") as renderer:
+        measure(
+            f"view 720 x 150, {name}, with sun, shadows and sky, in batches",
+            lambda: renderer.render(poses),
+            items=32,
+            unit="ms a view",
+        )
+
+
+def test_lighting(measure):
+    name, world = worlds.everyday()
+    measure(f"sun and shadows put on {name}, once", lambda: lit(world, Light()), rounds=3)
 
 
 @pytest.mark.parametrize("name", ["sphere ommatidia=1000", "ant"])

@@ -16,7 +16,7 @@ from tussock.navigation.cli.main import command_of
 from tussock.navigation.cli.options import RunOptions
 from tussock.navigation.cli.overview import COMMANDS
 from tussock.navigation.settings_table import TYPES
-from tussock.world.params import PRESETS, WORLDS, WorldParams
+from tussock.world.params import OTHERS, PRESETS, WORLDS, WorldParams
 from tussock.world.settings import describe
 
 FOLDER = Path(__file__).parent / "reference"
@@ -120,18 +120,23 @@ def worlds() -> str:
         )
         for name, each in fields.items()
     ]
-    orchard = WORLDS.find("orchard")
-    parameters = {name: each.default for name, each in inspect.signature(orchard).parameters.items() if name != "seed"}
-    own = [(f"`{name}`", described(orchard)[name], f"`{default:g}`") for name, default in parameters.items()]
     return "\n".join([
         "# Parameters of worlds", "",
         "A preset's name, and after it any of these parameters, is a world: `--world 'meadow field_width=20 trees=0'`. A value outside its "
         "range is refused. In Python: `World.generate(WorldParams(field_width=20, trees=0), seed=7)`.", "",
         f"{', '.join(f'`{name}`' for name in PRESETS)} have the same parameters, with other defaults:", "",
         *table(("parameter", "meaning", "unit", "range", *PRESETS), rows), "",
-        "## orchard", "", (inspect.getdoc(orchard) or "").split("\n\n")[0], "",
-        *table(("parameter", "meaning", "default"), own),
+        *(line for name in OTHERS for line in _of_its_own(name)),
     ]) + "\n"  # fmt: skip
+
+
+def _of_its_own(name: str) -> list[str]:
+    """The section of a preset that has parameters of its own."""
+    preset = WORLDS.find(name)
+    parameters = {each: about.default for each, about in inspect.signature(preset).parameters.items() if each != "seed"}
+    rows = [(f"`{each}`", described(preset)[each], f"`{default:g}`") for each, default in parameters.items()]
+    about = (inspect.getdoc(preset) or "").split("\n\n")[0]
+    return [f"## {name}", "", about, "", *table(("parameter", "meaning", "default"), rows), ""]
 
 
 def _range(field: dict[str, Any]) -> str:

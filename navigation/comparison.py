@@ -78,7 +78,8 @@ def compare_models(
         errors = errors_of_views(model, views, route_views, poses)
         scanned = time.perf_counter()
         navigator = experiment.make_navigator(experiment.replace(model=spec).make_model())
-        learn_views(navigator, views_around, around, route=route, senses=senses, seed=experiment.seed)
+        light = renderer.world.light
+        learn_views(navigator, views_around, around, route=route, senses=senses, seed=experiment.seed, light=light)
         *_, (last,) = experiment.walk(renderer, route).steps(navigator)
         yield Comparison(
             median_error_deg=errors.median_error_deg,

@@ -191,7 +191,8 @@ class Experiment(Surroundings):
                 navigator = self.make_navigator(self.make_model() if model is None else model)
                 images, poses = views or self.training_views(renderer, route, progress)
                 own = images.clone()  # others learn them, too, and a model of the user's may change them
-                learn_views(navigator, own, poses, route=route, senses=self.senses.make(), seed=self.seed)
+                light = renderer.world.light
+                learn_views(navigator, own, poses, route=route, senses=self.senses.make(), seed=self.seed, light=light)
         model = getattr(navigator, "model", None)
         trained = None  # where the navigator has no model, or learns without it
         if isinstance(model, FamiliarityModel) and not (isinstance(model, Model) and model.shape is None):

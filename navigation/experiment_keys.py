@@ -32,6 +32,7 @@ ROUTE_SETTINGS = (
     "max_slope_deg",
     "altitude_m",
     "cull_back_faces",
+    "light",
     "route",
     "route_seed",
     "route_length_m",

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tussock.world.geometry import Route
+from tussock.world.light import Light
 
 from .models.base import Images
 from .senses import Readings, Senses, measured_places
@@ -20,6 +21,7 @@ def learn_views(
     route: Route,
     senses: Senses,
     seed: int,
+    light: Light | None = None,
 ) -> None:
     """Let a navigator learn the views of a route or of a walk about its end.
 
@@ -30,9 +32,10 @@ def learn_views(
         route: Whose end is the goal.
         senses: By which the agent measures where they were taken, as it walks from the goal through the poses.
         seed: Of the noise of these.
+        light: Of the sky, for a compass that sees it.
     """
     if isinstance(navigator, LearningPlaces):
-        readings = Readings(senses, np.random.default_rng((seed, STREAM)))
+        readings = Readings(senses, np.random.default_rng((seed, STREAM)), light)
         navigator.learn_at(views, measured_places(poses, np.array(route.goal[:2]), readings))
     else:
         navigator.learn(views)

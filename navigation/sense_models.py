@@ -56,6 +56,7 @@ SENSES = Registry(
         "stankiewicz-webb": f"{__name__}:STANKIEWICZ_WEBB",
         "ant": f"{__name__}:ANT",
         "bee": f"{__name__}:BEE",
+        "dorsal-rim": "tussock.navigation.sky_compass:DorsalRim",
     },
 )
 

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from tussock.world.errors import SettingError
 from tussock.world.geometry import wrap_angle
+from tussock.world.light import Light
 
 from .sense_models import Senses
+from .sky_compass import DorsalRim
 
 READING = 0.5  # s between readings on a learning walk, as in Bee-Nav's simulation
 
@@ -19,19 +22,40 @@ class Readings:
     Attributes:
         senses: How good they are.
         random: What noise is drawn from; nothing is drawn where there is none.
+        light: Of the sky, for a compass that sees it.
         drift: Of the compass so far (rad).
+        before: What a compass in the sky read before (rad).
     """
 
     senses: Senses
     random: np.random.Generator
+    light: Light | None = None
     drift: float = 0.0
+    before: float | None = None
+
+    def __post_init__(self):
+        if isinstance(self.senses, DorsalRim) and self.light is None:
+            raise SettingError(
+                "the compass of these senses is in the sky, and this world has one colour above: give --light, such as --light sun"
+            )
 
     def read(
-        self, headings: Float[np.ndarray, " k"], distances: Float[np.ndarray, " k"]
+        self,
+        headings: Float[np.ndarray, " k"],
+        distances: Float[np.ndarray, " k"],
+        tilt: tuple[float, float] | None = None,
     ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-        """Headings (rad) and distances (m) of the parts of a way, as they are measured one after the other."""
+        """Headings (rad) and distances (m) of the parts of a way, as they are measured one after the other.
+
+        tilt: Pitch and roll of the head (rad); None where it is level.
+        """
         senses, seconds = self.senses, distances / self.senses.speed
         headings, distances = np.array(headings, dtype=float), np.array(distances, dtype=float)
+        if isinstance(senses, DorsalRim) and self.light is not None:
+            true, headings = headings.tolist(), np.empty(len(headings))
+            for k, heading in enumerate(true):
+                self.before = senses.heading(self.light, heading, tilt or (0.0, 0.0), self.random, self.before)
+                headings[k] = self.before
         if senses.compass_drift:
             drift = self.drift + np.cumsum(senses.compass_drift * np.sqrt(seconds) * self._normal(len(seconds)))
             headings, self.drift = headings + drift, float(drift[-1]) if len(drift) else self.drift

@@ -36,6 +36,7 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "mask": (str | None, "eye.mask"),
     "eye": (str | None, "eye.compound"),
     "cull_back_faces": (bool, "cull_back_faces"),
+    "light": (str | None, "light"),
     "gaze": (str, "posture.gaze"),
     "body_length_m": (float, "posture.body_length"),
     "pitch_noise_deg": (float, "posture.pitch_noise"),

@@ -3,7 +3,6 @@
 import dataclasses
 import logging
 import math
-import os
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,7 +15,20 @@ from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 from tussock.world.heading_names import HEADINGS
 from tussock.world.meshes.reading import MeshReading
-from tussock.world.settings import MAX_COORDINATE, choice, instance_of, number, refuse, settings, switch, text, whole
+from tussock.world.settings import (
+    MAX_COORDINATE,
+    choice,
+    converted,
+    instance_of,
+    number,
+    refuse,
+    settings,
+    switch,
+    text,
+    whole,
+)
+
+from .surroundings_fields import as_folder, as_light, as_route, as_world
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,6 +39,7 @@ if TYPE_CHECKING:
     from tussock.world.flight import Flight
     from tussock.world.geometry import Route
     from tussock.world.scene import World
+    from tussock.world.specs import Spec
 
 log = logging.getLogger(__name__)
 S = TypeVar("S", bound="Surroundings")
@@ -41,6 +54,7 @@ OF_WORLDS = (
     "max_slope",
     "altitude",
     "cull_back_faces",
+    "light",
     "route",
     "route_seed",
     "route_length",
@@ -49,36 +63,6 @@ OF_WORLDS = (
     "renderer",
     "posture",
 )  # fields that databases do not take
-
-
-def _world(value: Any) -> Any:
-    """A world; a file as text, as the command line gives it."""
-    if isinstance(value, str):
-        return value
-    from tussock.world.params import is_generated
-    from tussock.world.scene import World
-
-    if isinstance(value, Path):
-        return os.path.join(os.curdir, value) if is_generated(str(value)) else str(value)  # a file named like a preset
-    if not isinstance(value, World):
-        raise SettingError(f"world is {value!r}; give a preset's name, a file or a World")
-    return value
-
-
-def _route(value: Any) -> Any:
-    """A route; a file as its path."""
-    if isinstance(value, str | Path):
-        return Path(value)
-    from tussock.world.geometry import Route
-
-    if not isinstance(value, Route | None):
-        raise SettingError(f"route is {value!r}; give a Route, its file, or None")
-    return value
-
-
-def _folder(value: Any) -> Any:
-    """The folder of an image database as its path."""
-    return value if value is None else Path(value)
 
 
 def _eye(surroundings: "Surroundings") -> Eye:
@@ -103,11 +87,14 @@ class Surroundings:
         world: A preset's name (parameters may follow it), a file, or a `World`.
         world_seed: Of a generated world; None means `seed`.
         reading: How the file of a world is read: its axis that is up, its unit, and whether losses are refused.
-        ground: "flat": agents stand at z = 0. "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`). "route":
+        ground: "flat": agents stand at z = 0, or, in a world that has a terrain of its own (a generated one with hills), on that.
+            "mesh": on the surface of the world's mesh beneath them (see `World.on_mesh`). "route":
             they fly, at the heights of the route (`Route.heights`): everywhere at that of its nearest point.
         max_slope: Steepest ground of a mesh that can be stood and walked on (rad).
         altitude: Height over z = 0 at which they fly, as that of their eye (m); None: as `ground` says.
         cull_back_faces: Triangles are seen from their front only, as the original Sussex renderer did.
+        light: The sun and the sky: a spec, such as "sun azimuth_deg=90" (see world/light.py). None: the light in the world's own
+            colours, without shadows, and a sky of one colour.
         route: A `Route`, its file, or None to generate one. It may be in the coordinates of the world's file; see `World.origin_m`.
         route_seed: Of a generated route; None means `seed`.
         route_length: Of a generated route (m).
@@ -124,21 +111,22 @@ class Surroundings:
         threads: To draw with, and, in an experiment, to learn and compare with; None means one for each core.
     """
 
-    world: Any = attrs.field(default="tussock-field", converter=_world)
+    world: Any = attrs.field(default="tussock-field", converter=as_world)
     world_seed: int | None = whole(None, low=0, optional=True)
     reading: MeshReading = instance_of(MeshReading, attrs.Factory(MeshReading), "a MeshReading")
     ground: str = choice("flat", GROUNDS)
     max_slope: float = number(math.radians(45.0), low=math.radians(1.0), high=math.radians(89.0), unit="rad")
     altitude: float | None = number(None, low=-MAX_COORDINATE, high=MAX_COORDINATE, unit="m", optional=True)
     cull_back_faces: bool = switch(False)
-    route: Any = attrs.field(default=None, converter=_route)
+    light: "Spec | None" = converted(default=None, converter=as_light)
+    route: Any = attrs.field(default=None, converter=as_route)
     route_seed: int | None = whole(None, low=0, optional=True)
     route_length: float = number(8.0, low=0.1, unit="m")
     headings: str = choice("auto", HEADINGS)
     columns: str | None = text(None, optional=True)
     smooth: float = number(0.0, low=0, unit="m")
-    route_database: Path | None = attrs.field(default=None, converter=_folder)
-    grid_database: Path | None = attrs.field(default=None, converter=_folder)
+    route_database: Path | None = attrs.field(default=None, converter=as_folder)
+    grid_database: Path | None = attrs.field(default=None, converter=as_folder)
     eye: Eye = instance_of(Eye, attrs.Factory(_eye, takes_self=True), "an Eye")
     posture: Posture = instance_of(Posture, attrs.Factory(Posture), "a Posture")
     seed: int = whole(0, low=0)
@@ -213,10 +201,16 @@ class Surroundings:
         seed = self.seed if self.world_seed is None else self.world_seed
         world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
         world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
+        if self.light is not None:
+            from tussock.render.lighting import lit
+
+            world = lit(world, self.light.make())
         if self.ground == "mesh":
             return world.on_mesh(self.max_slope)
         if self.ground == "route" or self.altitude is not None:
             return world.flown(self._flight(world))
+        if world.terrain is not None:
+            return world if isinstance(self.world, World) else world.on_mesh(self.max_slope)
         if isinstance(self.world, str) and not is_generated(self.world):
             remark_on_ground(world, self.world, self.eye.z)
         return world
@@ -225,7 +219,7 @@ class Surroundings:
         """Where agents fly, below their eye. Raises SettingError where the route has no heights, or is under the ground."""
         import numpy as np
 
-        from tussock.world.flight import Flight
+        from tussock.world.flight import Flight, check_flight
 
         if self.altitude is not None:
             places = np.array([[0.0, 0.0, self.altitude]])
@@ -236,8 +230,7 @@ class Surroundings:
                     "ground route flies at the heights of a route: give one with a column z_m that has a number in each row, or an altitude"
                 )
             places = np.column_stack([route.xy, route.heights])
-        if world.ground is not None and (low := places[:, 2].min()) <= 0:
-            raise SettingError(f"a flight at z = {low:g} m is under the ground of the world; give heights over 0")
+        check_flight(world, places)
         return Flight(places - [0, 0, self.eye.z])
 
     def open_route(self, world: "World") -> "Route":

@@ -116,7 +116,7 @@ class Walker:
         self.stop_check = StopCheck(stopping, walk.route, walk.world.field, body.step_length)
         self.index, self.ended = 0, False
         self.displacement = displacement if displacement.left else None  # while it is to come
-        self.readings = Readings(senses, random.spawn(1)[0] if senses.noisy else random)
+        self.readings = Readings(senses, random.spawn(1)[0] if senses.noisy else random, walk.world.light)
         self.walked, self.touched, self.displaced = 0.0, False, False  # since the look before
         self.reset: StopReason | None = None
         self.view_distance: float | None = None  # of the entry of an image database whose view it sees (m)
@@ -128,7 +128,7 @@ class Walker:
 
     def sense(self) -> tuple[float, float]:
         """What its compass reads (rad), and its odometer since the look before (m)."""
-        compass, odometry = self.readings.read(np.array([self.pose.heading]), np.array([self.walked]))
+        compass, odometry = self.readings.read(np.array([self.pose.heading]), np.array([self.walked]), self.tilt)
         return float(compass[0]), float(odometry[0])
 
     def way_out(self) -> Journey:

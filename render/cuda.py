@@ -22,6 +22,7 @@ from .eye import Eye
 from .poses import AnyPoses, Views, frames_of, poses_of_eye
 from .scanline_kernels import find_directions
 from .scene_arrays import Scene
+from .sky import add_sky
 
 RAYS, VIEWS = 2**26, 2**15  # drawn at once, at most; a ray takes 8 bytes of the GPU's memory, and a column 16
 WIDE = (
@@ -84,6 +85,7 @@ class CudaRenderer:
             for begin in range(0, len(eyes), self._batch):
                 batch = slice(begin, begin + self._batch)
                 self._draw(eyes[batch], views[batch])
+        add_sky(self.world, self.eye, eyes, views)
         return views
 
     def _draw(self, eyes: Float[np.ndarray, "n 6"], views: Views) -> None:

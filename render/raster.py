@@ -24,6 +24,7 @@ from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
 from .gl import Context, Framebuffer, open_context
 from .poses import AnyPoses, Views, poses_of_eye
+from .sky import add_sky
 
 NEAR = 1e-4  # m; surfaces closer to the eye are not drawn. There is no far limit.
 
@@ -77,6 +78,7 @@ class RasterRenderer:
                     self._draw(face, position, axes)
                 self._framebuffer.read(self._atlas)
                 view[:] = self._cubemap.unwrap(self._atlas)
+        add_sky(self.world, self.eye, poses, views)
         return views
 
     def _draw(self, face: Face, position: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> None:
@@ -120,7 +122,8 @@ def _scene(world: World, cubemap: Cubemap) -> tuple[Any, Any]:
         def get_projection_matrix(self, width=None, height=None):
             return np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, NEAR), (0, 0, -1, 0)], dtype=float)
 
-    scene = pyrender.Scene(bg_color=[*(c / 255 for c in world.sky_rgb), 0.0])
+    sky = (0, 0, 0) if world.light else world.sky_rgb  # the sky of a light is added to the views, see sky.py
+    scene = pyrender.Scene(bg_color=[*(c / 255 for c in sky), 0.0])
     triangles, rgb = world.surfaces()
     primitives = []
     if world.texturing is not None:

@@ -38,6 +38,7 @@ from .eye import Eye
 from .poses import AnyPoses, Views, frames_of, poses_of_eye
 from .scanline_kernels import draw_views
 from .scene_arrays import Scene
+from .sky import add_sky
 
 
 class ScanlineRenderer:
@@ -99,6 +100,7 @@ class ScanlineRenderer:
         except IndexError:
             keys = np.empty((self.eye.width * self.eye.rays, self.eye.height * self.eye.rays), dtype=np.int64)
         draw_views(*self._scene, poses, frames, start, stop, keys, views.view("<u4")[..., 0])
+        add_sky(self.world, self.eye, poses, views, start, stop)
         self._scratch.append(keys)  # fresh memory costs more than drawing a small view
 
     def hits(self, poses: AnyPoses) -> tuple[Float[np.ndarray, "n height width"], Int64[np.ndarray, "n height width"]]:

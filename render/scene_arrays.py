@@ -153,7 +153,8 @@ class Scene(NamedTuple):
         azimuths = column_azimuths(eye.width * eye.rays)
         rays = Rays(azimuths, np.tan(elevations), eye.top, rows_per_rad, eye.rays)
         covered = np.column_stack([rgb, np.full(len(rgb), 255)])[::-1]
-        colours = np.vstack([[*world.sky_rgb, 0], covered]).astype("<u2").view("<i8")[:, 0]
+        sky = (0, 0, 0) if world.light else world.sky_rgb  # the sky of a light is added to the views, see sky.py
+        colours = np.vstack([[*sky, 0], covered]).astype("<u2").view("<i8")[:, 0]
         weights = np.cos(elevations).reshape(eye.height, eye.rays)
         paint = Paint(colours, weights / weights.sum(axis=1, keepdims=True) / eye.rays)
         return cls(triangles, rays, paint, Lookup.of(world))

@@ -282,6 +282,7 @@ OTHER: dict[str, Any] = {
     "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
     "top_deg": 50.0, "bottom_deg": -20.0, "field_deg": 270.0,
     "side": "left", "overlap_deg": 20.0, "eye": "ant", "mask": "mask.png", "cull_back_faces": True,
+    "light": "overcast",
     "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
     "headings": "bearing", "columns": "x,y", "smooth_m": 0.1,
     "encoding": "sky", "resize": 3.0, "blur": 1.0, "spacing_m": 0.05, "every": 2, "learning_walk_m": 0.0, "parallel_views": 3,

@@ -344,7 +344,7 @@ def test_a_file_may_have_a_name_that_begins_like_a_preset(tmp_path, monkeypatch,
     assert same(open_world(name), world)
 
 
-@pytest.mark.parametrize("name", ["desert", "tiny world", "desert field_width=3", ""])
+@pytest.mark.parametrize("name", ["tundra", "tiny world", "tundra field_width=3", ""])
 def test_a_name_of_neither_is_refused_with_the_presets(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="tussock-field") as refusal:

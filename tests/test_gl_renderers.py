@@ -121,9 +121,18 @@ def test_tall_pixels_are_averaged_by_solid_angle(backend, garden):
 @pytest.mark.parametrize(
     ("preset", "share"),
     quick(
-        [("tussock-field", 0.02), ("meadow", 0.02), ("scrub", 0.02), ("hay-meadow", 0.04), ("woodland", 0.06)],
+        [
+            ("tussock-field", 0.02),
+            ("meadow", 0.02),
+            ("scrub", 0.02),
+            ("hay-meadow", 0.04),
+            ("woodland", 0.06),
+            ("desert", 0.02),
+            ("tussock-field hill_height=0.5 rut_depth=0.1", 0.02),
+        ],
         ("tussock-field", 0.02),
         ("scrub", 0.02),
+        ("tussock-field hill_height=0.5 rut_depth=0.1", 0.02),
     ),
 )
 def test_agrees_in_generated_worlds(backend, preset, share):

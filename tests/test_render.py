@@ -23,7 +23,16 @@ from tussock.world.geometry import Pose
 
 CLONE = Path(__file__).parents[1]
 NAMES = {
-    "tussock.render": {"Eye", "Ommatidia", "Posture", "Renderer", "compound_eye", "draw_ommatidia", "open_renderer"},
+    "tussock.render": {
+        "Eye",
+        "Ommatidia",
+        "Posture",
+        "Renderer",
+        "compound_eye",
+        "draw_ommatidia",
+        "lit",
+        "open_renderer",
+    },
     "tussock.render.images": {
         "Camera",
         "Database",

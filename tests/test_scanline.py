@@ -61,11 +61,23 @@ def share_different(a: np.ndarray, b: np.ndarray) -> float:
 @pytest.mark.parametrize(
     "preset",
     quick(
-        ["tussock-field", "meadow", "scrub", "hay-meadow", "woodland", "tiny"],
+        [
+            "tussock-field",
+            "meadow",
+            "scrub",
+            "hay-meadow",
+            "woodland",
+            "tiny",
+            "desert",
+            "arena",
+            "tiny hill_height=0.5",
+        ],
         "tussock-field",
         "meadow",
         "scrub",
         "tiny",
+        "arena",
+        "tiny hill_height=0.5",
     ),
 )
 def test_equals_embree_in_generated_worlds(preset):

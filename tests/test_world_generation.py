@@ -27,7 +27,7 @@ from tussock.world.routes import clearance, generate_route
 from tussock.world.scene import Ground, World
 from tussock.world.settings import describe
 
-KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree", "herb", "culm", "litter", "inner_tree"}
+KINDS = {"tussock", "grass", "bush", "leaf", "stone", "tree", "herb", "culm", "litter", "inner_tree", "pebble"}
 PRESETS = {name: WORLDS.find(name)() for name in params.PRESETS}
 SEED = 5  # of most worlds here, so that each is generated once
 
@@ -89,6 +89,17 @@ def rounded(*arrays) -> str:
         ("tiny", 5, "76b543786054", 1, 8.0, None, "acd623f325ac"),
         ("hay-meadow", 5, "bc4ffce89c18", 1, 8.0, None, "4eff9ad08bed"),
         ("woodland", 5, "cd1ad26ca428", 1, 8.0, None, "04281bba0a6a"),
+        ("desert", 5, "655f3baba286", 1, 8.0, None, "5fe7fb714614"),
+        ("arena", 5, "7a987d3884a1", 1, 2.0, None, "010f399971d8"),
+        (
+            "tiny hill_height=0.5 mound_density=0.4 rut_depth=0.06 pebble_density=5",
+            5,
+            "16aeada23897",
+            1,
+            3.0,
+            None,
+            "e8343d81d4ef",
+        ),
         ("meadow flower_share=1 grass_height=0.14 field_depth=4", 2, "f93518b80c0f", 3, 4.0, None, "26d410f2c95c"),
         ("tussock-field field_width=18 field_depth=14", 1, "dc47bb3c69c3", 2, 12.0, None, "b05323666b9d"),
         ("scrub", 6, "38a27787c532", 1, 3.0, (3.25, 4.25), "94d931989501"),
@@ -216,6 +227,9 @@ INVALID = {
     "speckle": (-0.1, 1.5),
     "tree_forks": (5, 1.5),
     "litter_density": (501,),
+    "hill_height": (-0.1, float("nan")),
+    "rut_width": (0.0,),
+    "far_hill_distance": (5.0,),
 }
 
 
@@ -277,7 +291,7 @@ import numpy as np
 from functools import partial
 from tussock.world import Bounds, World, WorldParams
 
-DESERT = partial(WorldParams, field_width=2.0, field_depth=2.0, trees=3, tree_leaves=8, ground_rgb=(230, 200, 150))
+DUNES = partial(WorldParams, field_width=2.0, field_depth=2.0, trees=3, tree_leaves=8, ground_rgb=(230, 200, 150))
 
 def rocks(stones: float = 1.0) -> WorldParams:
     return WorldParams(field_width=2.0, field_depth=2.0, stone_density=stones, trees=0)
@@ -312,15 +326,15 @@ def test_presets_from_outside_work_by_location_and_by_entry_point(tmp_path):
     (here / "my_presets.py").write_text(OUTSIDE)
     (installed / "my_worlds.py").write_text(OUTSIDE)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-worlds\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[tussock.worlds]\nslab = my_worlds:slab\ndesert = my_worlds:DESERT\n")
+    (info / "entry_points.txt").write_text("[tussock.worlds]\nslab = my_worlds:slab\ndunes = my_worlds:DUNES\n")
     texts = [
-        "my_presets:DESERT",
-        "desert trees=0 haze=0",
+        "my_presets:DUNES",
+        "dunes trees=0 haze=0",
         "my_presets:rocks stones=0",
         "slab",
         "my_presets:slab height=2.5",
     ]
-    wrong = ["desert trees=-1", "my_presets:rocks trees=3", "my_presets:number", "my_presets:nothing", "my_presets:USE"]
+    wrong = ["dunes trees=-1", "my_presets:rocks trees=3", "my_presets:number", "my_presets:nothing", "my_presets:USE"]
     run = subprocess.run(
         [sys.executable, "-c", USE, *texts, *wrong],
         cwd=here,
@@ -329,10 +343,10 @@ def test_presets_from_outside_work_by_location_and_by_entry_point(tmp_path):
         text=True,
         check=True,
     )
-    desert, bare, rocks, slab, high_slab, *refused = map(json.loads, run.stdout.splitlines())
-    assert desert[2] == bare[2] == [0, 0, 2, 2]
-    assert desert[3]["params"]["ground_rgb"] == bare[3]["params"]["ground_rgb"] == [230, 200, 150]
-    assert (desert[3]["seed"], desert[3]["params"]["trees"], bare[3]["params"]["trees"]) == (4, 3, 0)
+    dunes, bare, rocks, slab, high_slab, *refused = map(json.loads, run.stdout.splitlines())
+    assert dunes[2] == bare[2] == [0, 0, 2, 2]
+    assert dunes[3]["params"]["ground_rgb"] == bare[3]["params"]["ground_rgb"] == [230, 200, 150]
+    assert (dunes[3]["seed"], dunes[3]["params"]["trees"], bare[3]["params"]["trees"]) == (4, 3, 0)
     assert rocks[3]["params"]["stone_density"] == 0
     assert (slab[:2], high_slab[:2]) == ([1, 5.0], [1, 6.5])
     parts = (
@@ -358,6 +372,7 @@ def test_a_registered_preset_is_generated_by_name(monkeypatch):
 
 def test_the_public_names_are_listed_and_each_loads():
     names = {"World", "Pose", "Route", "Bounds", "Ground", "WorldParams", "open_world", "read_world", "write_world"}
+    names.add("Light")
     names |= {
         "read_route",
         "write_route",

@@ -12,6 +12,7 @@ from .geometry import Pose as Pose
 from .geometry import Route as Route
 from .geometry import column_azimuths as column_azimuths
 from .geometry import turn_of_columns as turn_of_columns
+from .light import Light as Light
 from .meshes.reading import MeshReading as MeshReading
 from .params import WorldParams as WorldParams
 from .progress import no_progress as no_progress

@@ -2,10 +2,18 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Int64
 from scipy.spatial import KDTree
+
+from .errors import SettingError
+from .geometry import place_text
+from .terrain import Terrain
+
+if TYPE_CHECKING:
+    from .scene import World
 
 SPACING = 0.01  # m between the points of a path whose height is looked up
 
@@ -63,3 +71,29 @@ class Flight:
     def consists_of(self, index: Int64[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
         """Whether triangles are parts of it: none is."""
         return np.zeros(len(index), dtype=bool)
+
+
+def check_flight(world: "World", places: Float[np.ndarray, "n 3"]) -> None:
+    """Refuse a flight under the ground that a world is known to have. Raises SettingError.
+
+    Args:
+        world: The world.
+        places: x, y and z of the eye (m) along a path; a single one is a height over all of the field.
+    """
+    if world.ground is not None and (low := places[:, 2].min()) <= 0:
+        raise SettingError(f"a flight at z = {low:g} m is under the ground of the world; give heights over 0")
+    terrain = world.terrain
+    if not isinstance(terrain, Terrain) or terrain.part is None:
+        return
+    if len(places) == 1:
+        corners = terrain.triangles[terrain.is_ground].reshape(-1, 3).astype(np.float64)
+        corners = corners[world.field.contains(corners[:, 0], corners[:, 1])]
+        xy, ground, z = corners[:, :2], corners[:, 2], np.full(len(corners), places[0, 2])
+    else:
+        xy, ground, z = places[:, :2], np.nan_to_num(terrain.height(places[:, :2]), nan=-np.inf), places[:, 2]
+    if (z <= ground).any():
+        lowest = int((z - ground).argmin())
+        raise SettingError(
+            f"a flight at z = {z[lowest]:g} m is under the ground of the world, which is {ground[lowest]:.2f} m high at "
+            f"{place_text(*xy[lowest].tolist())}; give heights over that"
+        )

@@ -1,19 +1,22 @@
 """What grows where in a generated world, from its parameters and a seed.
 
 Plants follow a Neyman-Scott process: parents are placed where a smooth random field is high, and plants are scattered around
-them. Clearings and winding corridors stay open. A skyline of trees and tall shrubs surrounds the field. Speckles and litter may
-cover the ground, and a hedge hide its end.
+them. Clearings and winding corridors stay open. A skyline of trees and tall shrubs surrounds the field. Speckles, litter and
+pebbles may cover the ground, a hedge hide its end, and far hills stand around it. Where the ground is not flat, all stands on it.
 """
 
 import numpy as np
 from jaxtyping import Float
 
 from .errors import SettingError
+from .far_hills import far_hills
 from .geometry import Bounds
 from .ground_cover import litter, speckles
 from .hedge import hedge
 from .herbs import culms, herb
+from .land import Land, land_of
 from .params import WorldParams
+from .pebbles import pebbles
 from .plant_groups import GroupsBuilder, PlantGroups
 from .plant_parts import NO_PLANT, Plant, joined
 from .plants import bush, grass, leaf, stone, tree, tussock
@@ -27,24 +30,35 @@ Streams = dict[str, np.random.Generator]
 
 STREAMS = (  # append new ones: old seeds stay as they are
     "land", "bush", "stone", "tussock", "grass", "leaf", "tree",
-    "herb", "culm", "litter", "inner_tree", "speckles", "hedge",
+    "herb", "culm", "litter", "inner_tree", "speckles", "hedge", "relief", "pebble", "far_hills",
 )  # fmt: skip
+TREES = ("tree", "inner_tree")
 SHAPES = {"bush": bush, "stone": stone, "tussock": tussock, "leaf": leaf, "herb": herb}
 AT_ONCE = {
     "grass": grass,
     "culm": culms,
     "litter": litter,
+    "pebble": pebbles,
 }  # of these there are thousands: all of a kind are shaped at once
 KINDS = {"inner_tree": "tree"}  # what a kind is called in PlantGroups, where that differs
 
 
-def generate_plants(params: WorldParams, seed: int) -> tuple[Plant, PlantGroups]:
+def generate_relief(params: WorldParams, seed: int) -> Land | None:
+    """The ground of a world, or None where it is flat. Raises SettingError for a seed that is not a whole number from 0."""
+    return land_of(params, streams_of(seed)["relief"])
+
+
+def generate_plants(params: WorldParams, seed: int, land: Land | None) -> tuple[Plant, PlantGroups]:
     """All plants, stones and trees of a world, and which are which: the same parameters and seed give the same bytes.
+
+    They stand on the land, if there is one, whose triangles are the last. Trees keep their shape; of all else each corner is raised by
+    the height of the ground beneath it.
 
     Raises SettingError for a seed that is not a whole number from 0.
     """
     layout, streams = plant_layout(params, seed)
     pieces, groups = [NO_PLANT], GroupsBuilder()
+    feet: list[tuple[int, float, float]] = []  # of each tree: which piece it is, x and y (m)
     for kind, rows in layout.items():
         if kind in AT_ONCE:
             piece, row = AT_ONCE[kind](params, rows, streams[kind])
@@ -52,16 +66,27 @@ def generate_plants(params: WorldParams, seed: int) -> tuple[Plant, PlantGroups]
             pieces.append(piece)
             continue
         for x, y, size, tone in rows.tolist():
-            if kind in ("tree", "inner_tree"):
+            if kind in TREES:
                 piece = _tree(params, x, y, size, tone, streams[kind])
+                feet.append((len(pieces), x, y))
             else:
                 piece = SHAPES[kind](params, size, tone, streams[kind])
             groups.add(KINDS.get(kind, kind), np.array([(x, y)]), np.zeros(len(piece.rgb), np.int64))
             pieces.append(piece._replace(triangles=piece.triangles + np.array([x, y, 0], np.float32)))
-    for piece in (speckles(params, streams["speckles"]), hedge(params, streams["hedge"])):
-        groups.add_none(len(piece.rgb))
-        pieces.append(piece)
-    return joined(pieces), groups.build()
+    covers = [hedge(params, streams["hedge"]), far_hills(params, streams["far_hills"])]
+    if land is None:
+        covers = [speckles(params, streams["speckles"]), *covers]
+    groups.add_none(sum(len(cover.rgb) for cover in covers))
+    pieces += covers
+    if land is None:
+        return joined(pieces), groups.build()
+    below = [piece.triangles[..., :2].astype(np.float64) for piece in pieces]
+    for piece, x, y in feet:
+        below[piece][:] = x, y
+    raised = joined(pieces)
+    raised = raised._replace(triangles=land.raised(raised.triangles, np.concatenate(below)))
+    groups.add_none(len(land.ground.rgb))
+    return joined([raised, land.ground]), groups.build(land.height)
 
 
 def _tree(p: WorldParams, x: float, y: float, size: float, tone: float, rng: np.random.Generator) -> Plant:
@@ -78,9 +103,14 @@ def seeded(seed: int) -> np.random.Generator:
     return np.random.default_rng(int(seed))
 
 
+def streams_of(seed: int) -> Streams:
+    """The generators of a world, by what they are for. Raises SettingError as `seeded` does."""
+    return dict(zip(STREAMS, seeded(seed).spawn(len(STREAMS)), strict=True))
+
+
 def plant_layout(params: WorldParams, seed: int) -> tuple[Layout, Streams]:
     """Where every plant, stone and tree of a world is, by kind, and the generator for the shapes of each kind."""
-    streams: Streams = dict(zip(STREAMS, seeded(seed).spawn(len(STREAMS)), strict=True))
+    streams = streams_of(seed)
     p, land = params, streams["land"]
     fertility, tone = random_field(p.patch_size, land), random_field(2 * p.patch_size, land)
     open_ground = _open_ground(p, land)
@@ -102,8 +132,9 @@ def plant_layout(params: WorldParams, seed: int) -> tuple[Layout, Streams]:
         "tree": _skyline(p, streams["tree"]),
         "herb": rows_of("herb", p.herb_density, p.herb_height, p.size_spread),
         "culm": rows_of("culm", p.culm_density, p.culm_height, 0.5 * p.size_spread),
-        "litter": _litter(p, area, streams["litter"]),
+        "litter": _scattered(p.litter_density, p.litter_length, area, streams["litter"]),
         "inner_tree": rows_of("inner_tree", p.tree_density, p.tree_height, 0.5 * p.size_spread, 0.25 * p.tree_height),
+        "pebble": _scattered(p.pebble_density, p.pebble_size, area, streams["pebble"]),
     }
     _move_to_tussocks(layout["grass"], layout["tussock"], p.grass_near_tussocks, streams["grass"])
     return layout, streams
@@ -161,11 +192,11 @@ def _thinned(xy, count: int, apart: float) -> Float[np.ndarray, "n 2"]:
     return xy[kept]
 
 
-def _litter(p: WorldParams, area: Bounds, rng: np.random.Generator) -> Float[np.ndarray, "n 4"]:
-    """Rows of the litter: anywhere, on open ground as well."""
-    count = round(p.litter_density * area.size[0] * area.size[1])
+def _scattered(density: float, size: float, area: Bounds, rng: np.random.Generator) -> Float[np.ndarray, "n 4"]:
+    """Rows of the litter and of pebbles: anywhere, on open ground as well."""
+    count = round(density * area.size[0] * area.size[1])
     xy = np.array(area[:2]) + area.size * rng.random((count, 2))
-    sizes = p.litter_length * np.clip(rng.lognormal(0, 0.4, count), 0.4, 2.1)
+    sizes = size * np.clip(rng.lognormal(0, 0.4, count), 0.4, 2.1)
     return np.column_stack([xy, sizes, rng.random(count)])
 
 

@@ -26,34 +26,47 @@ def speckles(p: WorldParams, rng: np.random.Generator) -> Plant:
         return NO_PLANT
     from scipy.spatial import Delaunay  # takes half a second, which a world from a file need not wait for
 
-    corners = _speckle_corners(p, rng)
+    corners = ground_corners(p.field, p.speckle_size, p.ground_margin, rng)
     z = rng.uniform(*SPECKLE_Z, len(corners))
     triangles = np.column_stack([corners, z])[Delaunay(corners).simplices]
-    n, middle = len(triangles), triangles[..., :2].mean(axis=1)
+    return sunlit(triangles, shades(p, triangles[..., :2].mean(axis=1), rng))
+
+
+def shades(p: WorldParams, middle: Float[np.ndarray, "n 2"], rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
+    """Colours of the triangles of a ground with soil and moss, by their middles (m)."""
+    n = len(middle)
     shade, moss = random_field(0.5 * p.patch_size, rng), random_field(0.5 * p.patch_size, rng)
     mossy = moss(middle) + rng.normal(0, 0.3, n)  # patches with ragged edges
     is_moss = mossy > np.quantile(mossy, 1 - p.moss_share)
     brightness = np.exp(p.speckle * np.clip(0.7 * shade(middle) + rng.normal(0, 1, n), -2.5, 1.5))
-    rgb = np.where(is_moss[:, None], p.moss_rgb, p.ground_rgb) * brightness[:, None]
-    return sunlit(triangles, rgb)
+    return np.where(is_moss[:, None], p.moss_rgb, p.ground_rgb) * brightness[:, None]
 
 
-def _speckle_corners(p: WorldParams, rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
-    """Corners of speckles (m): an uneven grid in the field, coarser ones around it, and the corners of the ground."""
-    ground = p.field.widened(p.ground_margin)
-    points, width, margin, within = [_uneven_grid(p.field, p.speckle_size, rng)], p.speckle_size, 0.0, p.field
-    while margin < p.ground_margin:
+def ground_corners(
+    field: Bounds, width: float, ground_margin: float, rng: np.random.Generator, band: float = BAND
+) -> Float[np.ndarray, "n 2"]:
+    """Corners of the triangles of a ground (m): an uneven grid in the field, coarser ones around it, and the corners of the ground.
+
+    Args:
+        field: The field (m).
+        width: Of the triangles in the field (m).
+        ground_margin: The ground continues this far around the field (m).
+        rng: Generator to draw from.
+        band: Around the field, triangles are twice as wide in each further band, which has this many of their widths.
+    """
+    points, margin, within = [uneven_grid(field, width, rng)], 0.0, field
+    while margin < ground_margin:
         width *= 2
-        margin = min(margin + BAND * width, p.ground_margin)
-        area = p.field.widened(margin)
-        grid = _uneven_grid(area, width, rng)
+        margin = min(margin + band * width, ground_margin)
+        area = field.widened(margin)
+        grid = uneven_grid(area, width, rng)
         points.append(grid[~within.contains(*grid.T)])
         within = area
-    x0, y0, x1, y1 = ground
+    x0, y0, x1, y1 = field.widened(ground_margin)
     return np.concatenate([*points, [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]])
 
 
-def _uneven_grid(area: Bounds, spacing: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
+def uneven_grid(area: Bounds, spacing: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
     """Points about `spacing` metres from each other, one in each cell of a grid."""
     columns, rows = np.ceil(area.size / spacing).astype(int).tolist()
     row, column = np.mgrid[:rows, :columns].reshape(2, -1) + rng.uniform(0.15, 0.85, (2, rows * columns))

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from .geometry import Bounds
 from .params import WorldParams
-from .plant_parts import NO_PLANT, Plant, directions, simple_leaves, sunlit
+from .plant_parts import NO_PLANT, Plant, directions, hazy, simple_leaves, sunlit
 from .random_fields import random_ring
 
 DISTANCE = 0.95  # share of the ground's margin between the field and the hedge
@@ -35,9 +35,7 @@ def hedge(p: WorldParams, rng: np.random.Generator) -> Plant:
     leaf_rgb = rgb[part] * (rng.lognormal(0, 0.1, len(part)) * (0.7 + 0.4 * level))[:, None]
     triangles = np.concatenate([_wall(foot, height), leaves])
     leafy = sunlit(triangles, np.concatenate([0.7 * rgb.repeat(2, axis=0), leaf_rgb]), thin=True)
-    haze = p.haze_at(distance)
-    hazy = ((each * (1 - haze) + np.array(p.sky_rgb) * haze).astype(np.uint8) for each in leafy[1:])
-    return Plant(leafy.triangles, *hazy)
+    return hazy(leafy, p.sky_rgb, p.haze_at(distance))
 
 
 def _around(field: Bounds, distance: float) -> Float[np.ndarray, "n 2"]:

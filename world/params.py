@@ -1,6 +1,6 @@
 """What a generated world is like: its parameters, the presets, and which texts name a generated world."""
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import attrs
@@ -87,6 +87,17 @@ class WorldParams:
         moss_share: Share of the ground that is covered with moss.
         moss_rgb: Colour of moss.
         hedge_height: Median height of a hedge where the ground ends, which hides the end from eyes lower than a third of it; 0 for none.
+        hill_height: Height of hills, from the lowest valley to the highest top; 0 for none.
+        hill_size: Distance between hills.
+        mound_density: Density of mounds, as those of ants and moles.
+        mound_height: Median height of a mound.
+        mound_width: Median width of a mound; a mound that is twice as high is twice as wide.
+        rut_depth: Depth of ruts: tracks that wind through the field; 0 for none.
+        rut_width: Width of a rut.
+        pebble_density: Density of pebbles; those that are lower than a step are walked over, the others are obstacles.
+        pebble_size: Width of a pebble.
+        far_hill_height: Height of hills far away, all around; 0 for none.
+        far_hill_distance: Distance from the field to the first of them.
     """
 
     name: ClassVar[str] = "world"  # in errors
@@ -167,10 +178,34 @@ class WorldParams:
     moss_rgb: RGB = colour((94, 112, 52))
     hedge_height: float = number(0.0, low=0, high=20, unit="m")
 
+    hill_height: float = number(0.0, low=0, high=20, unit="m")
+    hill_size: float = number(4.0, low=0.5, high=100, unit="m")
+    mound_density: float = number(0.0, low=0, high=5, unit="1/m2")
+    mound_height: float = number(0.12, low=0.01, high=2, unit="m")
+    mound_width: float = number(0.5, low=0.05, high=5, unit="m")
+    rut_depth: float = number(0.0, low=0, high=0.5, unit="m")
+    rut_width: float = number(0.4, low=0.1, high=3, unit="m")
+    pebble_density: float = number(0.0, low=0, high=200, unit="1/m2")
+    pebble_size: float = number(0.02, low=0.005, high=0.1, unit="m")
+    far_hill_height: float = number(0.0, low=0, high=500, unit="m")
+    far_hill_distance: float = number(150.0, low=20, high=2000, unit="m")
+
     @property
     def field(self) -> Bounds:
         """The field (m)."""
         return Bounds(0.0, 0.0, self.field_width, self.field_depth)
+
+    @property
+    def has_relief(self) -> bool:
+        """Whether the ground is not flat."""
+        return self.hill_height > 0 or self.rut_depth > 0 or self.mound_density > 0
+
+    @property
+    def land(self) -> Bounds:
+        """Where there is ground (m): the field and its margin, and, where there are far hills, all that is within them."""
+        return self.field.widened(
+            max(self.ground_margin, 1.8 * self.far_hill_distance if self.far_hill_height else 0.0)
+        )
 
     def haze_at(self, distance: float) -> float:
         """Share of the sky's colour in what stands at a distance from the field (m)."""
@@ -181,62 +216,18 @@ class WorldParams:
         return {name: list(value) if isinstance(value, tuple) else value for name, value in attrs.asdict(self).items()}
 
 
-MEADOW = partial(
-    WorldParams, ground_rgb=(172, 152, 102), sky_rgb=(176, 208, 238), cluster_plants=9.0, cluster_radius=0.5, clearings=4,
-    tussock_density=0.4, tussock_height=0.24, tussock_rgb=(96, 150, 54), dry_share=0.08,
-    grass_density=20.0, grass_height=0.13, grass_near_tussocks=0.15, grass_rgb=(122, 170, 62), flower_share=0.16,
-    flower_rgb=(226, 96, 130), bush_density=0.02, bush_rgb=(70, 124, 58), stone_density=0.03, leaf_density=0.3,
-    trees=42, tree_height=2.4, tree_gaps=0.2, tree_rgb=(64, 112, 58), tree_other_rgb=(96, 132, 60),
-)  # fmt: skip
-SCRUB = partial(
-    WorldParams, ground_rgb=(206, 148, 104), sky_rgb=(196, 214, 226), patchiness=1.1, corridor_width=0.5,
-    tussock_density=0.45, tussock_height=0.2, tussock_rgb=(150, 148, 84), dry_rgb=(214, 186, 120), dry_share=0.4,
-    grass_density=11.0, grass_height=0.07, grass_rgb=(176, 160, 96), flower_share=0.0,
-    bush_density=0.2, bush_height=0.5, bush_leaves=125, bush_rgb=(98, 116, 78), stone_density=0.4, stone_size=0.2,
-    stone_rgb=(168, 128, 104), trees=32, tree_height=2.0, tree_gaps=0.45, tree_rgb=(88, 100, 66), tree_other_rgb=(132, 104, 70),
-)  # fmt: skip
-TINY = partial(  # fewer than 200 triangles for any seed
-    WorldParams, field_width=3.0, field_depth=3.0, border=0.0, ground_margin=6.0, patchiness=0.3, cluster_plants=1.0,
-    clearings=0, corridor_width=0.0, size_spread=0.25, tussock_density=0.56, tussock_height=0.24, tussock_blades=4,
-    grass_density=1.78, grass_blades=2, grass_height=0.04, flower_share=0.0, bush_density=0.0, leaf_density=0.0,
-    stone_density=0.0, trees=7, tree_height=1.3, tree_distance=0.9, tree_leaves=8,
-)  # fmt: skip
-HAY_MEADOW = partial(
-    WorldParams, border=0.5, ground_margin=30.0, ground_rgb=(112, 92, 64), sky_rgb=(176, 208, 238), patchiness=0.5,
-    cluster_plants=25.0, cluster_radius=0.08, size_spread=0.45, clearings=1, clearing_radius=0.5, corridor_width=0.4,
-    tussock_density=0.6, tussock_height=0.3, tussock_rgb=(104, 146, 60), dry_rgb=(172, 152, 104), dry_share=0.15,
-    grass_density=85.0, grass_height=0.17, grass_near_tussocks=0.05, grass_rgb=(112, 154, 58), flower_share=0.08,
-    flower_rgb=(232, 196, 48), bush_density=0.0, leaf_density=0.0, stone_density=0.03,
-    trees=36, tree_height=3.0, tree_gaps=0.25, tree_leaves=150, tree_rgb=(64, 112, 58), tree_other_rgb=(96, 132, 60), tree_forks=2,
-    herb_density=6.0, herb_flower_rgb=(176, 112, 190), culm_density=18.0, culm_height=0.38,
-    litter_density=300.0, litter_length=0.022, litter_stems=0.35, litter_green=0.6, leaf_rgb=(132, 102, 60),
-    speckle=0.2, moss_share=0.55, hedge_height=3.0,
-)  # fmt: skip
-WOODLAND = partial(
-    WorldParams, border=0.5, ground_margin=30.0, ground_rgb=(100, 78, 54), sky_rgb=(196, 214, 226), corridor_width=0.5,
-    tussock_density=0.3, tussock_height=0.22, tussock_rgb=(96, 132, 56), dry_rgb=(158, 130, 88),
-    grass_density=12.0, grass_height=0.1, grass_rgb=(104, 140, 58), flower_share=0.0,
-    bush_density=0.3, bush_height=0.5, bush_leaves=100, leaf_density=0.0, stone_density=0.08,
-    trees=60, tree_height=5.0, tree_gaps=0.05, tree_leaves=400, tree_density=0.12, tree_forks=3,
-    herb_density=7.0, herb_flower_rgb=(236, 234, 224),
-    litter_density=300.0, litter_length=0.032, litter_stems=0.15, litter_green=0.1, leaf_rgb=(146, 92, 50),
-    speckle=0.2, moss_share=0.25, moss_rgb=(80, 102, 44), hedge_height=6.0,
-)  # fmt: skip
-
-# A preset returns WorldParams, as these do, or takes a seed and returns a World.
+# A preset returns WorldParams, as those of presets.py do, or takes a seed and returns a World.
 PRESETS = {
-    "tussock-field": "WorldParams",
-    "meadow": "MEADOW",
-    "scrub": "SCRUB",
-    "tiny": "TINY",
-    "hay-meadow": "HAY_MEADOW",
-    "woodland": "WOODLAND",
+    "tussock-field": "params:WorldParams",
+    "meadow": "presets:MEADOW",
+    "scrub": "presets:SCRUB",
+    "tiny": "presets:TINY",
+    "hay-meadow": "presets:HAY_MEADOW",
+    "woodland": "presets:WOODLAND",
+    "desert": "presets:DESERT",
 }
-WORLDS = Registry(
-    "worlds",
-    "world",
-    {name: f"{__name__}:{where}" for name, where in PRESETS.items()} | {"orchard": "tussock.world.orchard:orchard"},
-)
+OTHERS = {"orchard": "orchard:orchard", "arena": "arena:arena"}  # they have parameters of their own
+WORLDS = Registry("worlds", "world", {name: f"tussock.world.{where}" for name, where in (PRESETS | OTHERS).items()})
 DESCRIPTIONS = {  # what the worlds of tussock are
     "tussock-field": "Tussocks and short grass, bushes and trees about it; most results are of it",
     "meadow": "Thin grass on bare ground, few tussocks",
@@ -244,7 +235,9 @@ DESCRIPTIONS = {  # what the worlds of tussock are
     "tiny": "Fewer than 200 triangles, for tests and first tries",
     "hay-meadow": "Dense grasses, seed heads, herbs and flowers on a speckled ground with litter",
     "woodland": "Trees with branches, twigs and leaves over a ground of dead leaves, moss and herbs",
+    "desert": "Sand with pebbles, dry tussocks and low shrubs, far hills all around",
     "orchard": "Single trees on open ground, as in the forests of Bee-Nav (2026)",
+    "arena": "A round arena of a laboratory: a wall with bars and shapes around a plain floor",
 }
 
 

@@ -1,5 +1,6 @@
 """Which triangles of a world are which plant."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,13 +63,16 @@ class GroupsBuilder:
         """Add triangles that belong to no plant."""
         self.of.append(np.full(count, -1))
 
-    def build(self) -> PlantGroups:
-        """The groups of all that was added."""
+    def build(self, height: Callable[[Float[np.ndarray, "n 2"]], Float[np.ndarray, " n"]] | None = None) -> PlantGroups:
+        """The groups of all that was added. `height` gives that of the ground at positions (both m); None: it is flat."""
         names = tuple(dict.fromkeys(self.kinds))
         number = {name: i for i, name in enumerate(names)}
+        foot = np.concatenate([np.zeros((0, 3)), *self.foot])
+        if height is not None:
+            foot[:, 2] = height(foot[:, :2])
         return PlantGroups(
             of=np.concatenate([np.zeros(0), *self.of]).astype(np.int32),
             kinds=names,
             kind=np.array([number[name] for name in self.kinds], dtype=np.uint8),
-            foot=np.concatenate([np.zeros((0, 3)), *self.foot]).astype(np.float32),
+            foot=foot.astype(np.float32),
         )

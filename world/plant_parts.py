@@ -169,6 +169,12 @@ def coloured(triangles, rgb, light) -> Plant:
     return Plant(triangles.astype(np.float32), lit, np.clip(rgb, 0, 255).astype(np.uint8))
 
 
+def hazy(plant: Plant, sky_rgb: RGB, haze: float) -> Plant:
+    """What stands far away: with a share of the sky's colour in its own."""
+    mixed_rgb = ((each * (1 - haze) + np.array(sky_rgb) * haze).astype(np.uint8) for each in plant[1:])
+    return Plant(plant.triangles, *mixed_rgb)
+
+
 def joined(pieces: list[Plant]) -> Plant:
     """Several pieces as one plant."""
     return Plant(*map(np.concatenate, zip(*pieces, strict=True)))

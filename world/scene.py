@@ -12,12 +12,13 @@ from jaxtyping import Bool, Float, Float32, UInt8
 
 from .errors import SettingError
 from .flight import Flight
-from .generate import GENERATOR, generate_plants
+from .generate import GENERATOR, generate_plants, generate_relief
 from .geometry import Bounds
+from .light import Light
 from .params import WORLDS, WorldParams, preset_of
 from .plant_groups import PlantGroups
 from .settings import MAX_COORDINATE, RGB
-from .terrain import MAX_SLOPE, Terrain
+from .terrain import MAX_SLOPE, Part, Terrain
 from .textures import Texturing
 
 if TYPE_CHECKING:
@@ -73,9 +74,11 @@ class World:
         origin_m: What was subtracted from the coordinates of the file (m): they are those of the world plus this.
         texturing: Textures and corner colours of the triangles, or None. `rgb` is then the mean colour of each triangle, which
             maps and recordings show; the renderers draw the texturing.
-        terrain: The ground of the mesh, which agents stand on (see `on_mesh`), or where they fly; None: they stand at z = 0.
+        terrain: The ground of the mesh, which agents stand on (see `on_mesh`), or where they fly; None: they stand at z = 0. A generated
+            world whose ground is not flat has one.
         reflectance: (n, 3) the colours in even light, which another light is put on (see light.py); None: those of `rgb`.
         plants: Which triangles are which plant; None where this is not known.
+        light: The light that its colours show (see render/lighting.py), and that makes the sky; None: a sky of one colour.
     """
 
     triangles: Float32[np.ndarray, "n 3 3"]
@@ -90,6 +93,7 @@ class World:
     terrain: Terrain | Flight | None = None
     reflectance: UInt8[np.ndarray, "n 3"] | None = None
     plants: PlantGroups | None = None
+    light: Light | None = None
 
     def __post_init__(self):
         n = len(self.triangles)
@@ -137,26 +141,38 @@ class World:
             raise SettingError(
                 f"the world {params!r} gives an object of type {type(made).__name__}; a preset returns WorldParams or a World"
             )
-        plant, groups = generate_plants(made, seed)
-        return cls(
+        land = generate_relief(made, seed)
+        plant, groups = generate_plants(made, seed, land)
+        world = cls(
             **plant._asdict(),
             plants=groups,
-            ground=Ground(made.ground_rgb, made.field.widened(made.ground_margin)),
+            ground=Ground(made.ground_rgb, made.land) if land is None else None,
             sky_rgb=made.sky_rgb,
             field=made.field,
             origin={"generator": GENERATOR, "preset": preset_of(made), "seed": int(seed), "params": made.to_dict()},
         )
+        n = len(world.triangles)
+        return world if land is None else world.on_mesh(part=(n - len(land.ground.rgb), n))
 
-    def on_mesh(self, max_slope: float = MAX_SLOPE) -> "World":
+    def on_mesh(self, max_slope: float = MAX_SLOPE, part: Part | None = None) -> "World":
         """The same world, where agents stand on its triangles (and `ground`); terrain.py explains on which of them.
 
         Args:
             max_slope: Steepest ground that can be stood and walked on (rad).
+            part: The first of the triangles that are the ground, and the one after the last. None: as in `terrain`, or unknown.
 
         Raises:
             InputError: Where nothing can be stood on.
         """
-        terrain = Terrain.of(self.surfaces()[0], float(np.prod(self.field.size)), max_slope)
+        if part is None and isinstance(self.terrain, Terrain):
+            part = self.terrain.part
+        if (
+            part is not None
+            and isinstance(self.terrain, Terrain)
+            and (part, max_slope) == (self.terrain.part, self.terrain.max_slope)
+        ):
+            return self
+        terrain = Terrain.of(self.surfaces()[0], float(np.prod(self.field.size)), max_slope, part)
         return dataclasses.replace(self, terrain=terrain)
 
     def flown(self, flight: Flight) -> "World":

@@ -5,7 +5,7 @@ STEP_HEIGHT high, such as a pebble or a kerb, are walked over, so they are walka
 form a piece. The ground consists of the piece that covers the largest area, and of each piece that covers at least MIN_SHARE of
 that. So the top of a post, a leaf or a boulder with steep sides is not ground: an agent stands on what is under it. Pieces that
 face down are ceilings or undersides, and count only where no large piece faces up. Where ground lies above ground, an agent
-stands on the highest.
+stands on the highest. Where it is known which triangles are the ground, as in a generated world, the others do not count.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,8 @@ from jaxtyping import Bool, Float, Int64
 
 from .errors import InputError
 from .geometry import place_text
+
+Part = tuple[int, int]  # of the triangles of a mesh: the first, and the one after the last
 
 MAX_SLOPE = np.radians(45.0)
 STEP_HEIGHT = 0.008  # m; an insect walks over what is lower
@@ -34,15 +36,21 @@ class Terrain:
         triangles: (n, 3, 3) All triangles of the mesh (m).
         is_ground: (n,) Which of them are ground.
         max_slope: Slope up to which a triangle is walkable (rad).
+        part: The first of the triangles that the ground is made of, be they walkable or not, and the one after the last; None: unknown.
     """
 
     triangles: Float[np.ndarray, "n 3 3"]
     is_ground: Bool[np.ndarray, " n"]
     max_slope: float
+    part: Part | None = None
 
     @classmethod
     def of(
-        cls, triangles: Float[np.ndarray, "n 3 3"], field_area: float = np.inf, max_slope: float = MAX_SLOPE
+        cls,
+        triangles: Float[np.ndarray, "n 3 3"],
+        field_area: float = np.inf,
+        max_slope: float = MAX_SLOPE,
+        part: Part | None = None,
     ) -> "Terrain":
         """The ground of some triangles.
 
@@ -50,11 +58,13 @@ class Terrain:
             triangles: (n, 3, 3) Corners (m).
             field_area: Area where agents may be (m2). A piece counts as no larger than this.
             max_slope: Slope up to which a triangle is walkable (rad).
+            part: Where the ground is among the triangles; None: it is looked for. See `Terrain`.
 
         Raises:
             InputError: Where nothing is walkable.
         """
-        corners = triangles.astype(np.float64)
+        those = slice(*part) if part else slice(None)
+        corners = triangles[those].astype(np.float64)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         up = normals[:, 2] / 2  # the area as seen from above, negative where it faces down
         level = (up != 0) & (2 * np.abs(up) >= np.cos(max_slope) * np.linalg.norm(normals, axis=1))
@@ -64,15 +74,18 @@ class Terrain:
         is_ground = np.zeros(len(corners), dtype=bool)
         is_ground[walkable] = _is_in_large_piece(corners[walkable], up[walkable], field_area)
         if not (is_ground & (up != 0)).any():
+            instead = "lower hills, mounds or ruts" if part else "--ground flat"
             raise InputError(
                 f"the world's mesh has no surface to stand on: nothing of it slopes by less than {np.degrees(max_slope):g} degrees; "
-                "give --ground flat, or a greater --max-slope-deg"
+                f"give {instead}, or a greater --max-slope-deg"
             )
-        return cls(triangles, is_ground, max_slope)
+        of_all = np.zeros(len(triangles), dtype=bool)
+        of_all[those] = is_ground
+        return cls(triangles, of_all, max_slope, part)
 
     def __reduce__(self):
         """Without its grids, so that the same terrain always has the same bytes."""
-        return Terrain, (self.triangles, self.is_ground, self.max_slope)
+        return Terrain, (self.triangles, self.is_ground, self.max_slope, self.part)
 
     def height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Height of the highest ground at positions (m); nan where there is none.
@@ -122,9 +135,11 @@ class Terrain:
 
     def is_steep(self, x: float, y: float) -> bool:
         """Whether the mesh is too steep to be ground at a position (m). Takes long: it looks at every triangle."""
-        here = (self.triangles[..., :2].min(axis=1) <= (x, y)).all(axis=1) & ~self.is_ground
-        here &= (self.triangles[..., :2].max(axis=1) >= (x, y)).all(axis=1)
-        corners = self.triangles[here].astype(np.float64)
+        those = slice(*self.part) if self.part else slice(None)
+        triangles = self.triangles[those]
+        here = (triangles[..., :2].min(axis=1) <= (x, y)).all(axis=1) & ~self.is_ground[those]
+        here &= (triangles[..., :2].max(axis=1) >= (x, y)).all(axis=1)
+        corners = triangles[here].astype(np.float64)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         steep = np.abs(normals[:, 2]) < np.cos(self.max_slope) * np.linalg.norm(normals, axis=1)
         return bool(np.isfinite(_height_in(corners[steep], np.tile((x, y), (int(steep.sum()), 1)))).any())

@@ -7,6 +7,7 @@ import changes
 import comparison
 import descriptions
 import eyes
+import light
 import ommatidia
 import pictures
 import processors
@@ -65,6 +66,7 @@ MEASUREMENTS = (
     | comparison.MEASUREMENTS
     | descriptions.MEASUREMENTS
     | eyes.MEASUREMENTS
+    | light.MEASUREMENTS
     | ommatidia.MEASUREMENTS
     | pictures.MEASUREMENTS
     | processors.MEASUREMENTS

@@ -24,6 +24,9 @@ TIMELINE = 40  # rows at the bottom of the viewer, whose marks depend on how qui
 DRAWN_AT = 58  # step of the walk at which the panorama is taken
 
 WORLD_SEED = 7
+SHOWN = {name: name for name in WORLDS.builtin} | {
+    "relief": "tussock-field hill_height=0.6 rut_depth=0.08 mound_density=0.2"
+}  # figures of docs/worlds.md
 WALK = ("--seed", 9, "--offset-m", 0.1)
 LOST = ("--offset-m", 0.1, "--learning-walk-m", 0)
 CAUSE = ("--seed", 3, "--size", "360x75", "--resize", 3, *LOST, "--scan-deg", 360)
@@ -114,10 +117,10 @@ def measure_models(folder: Path) -> Values:
 
 
 def measure_worlds(folder: Path) -> Values:
-    """The figures of docs/worlds.md: each preset from above, and as an eye sees it at the start of a route."""
+    """The figures of docs/worlds.md: each preset, and one with hills, from above, and as an eye sees it at the start of a route."""
     drawn, triangles = {}, {}
-    for name in WORLDS.builtin:
-        world = World.generate(name, seed=WORLD_SEED)
+    for name, text in SHOWN.items():
+        world = World.generate(text, seed=WORLD_SEED)
         triangles[name] = len(world.triangles)
         start = Pose(0.0, 0.0, 0.0) if name == "orchard" else generate_route(world, WORLD_SEED, length=2.0).start
         with open_renderer(world) as renderer:
@@ -126,6 +129,8 @@ def measure_worlds(folder: Path) -> Values:
             figure = Figure(figsize=(8, 8.6), layout="constrained")
             above, seen = figure.subplots(2, height_ratios=[3, 1])
             draw_world(above, world)
+            if name == "arena":  # whose wall is around the field
+                above.set(xlim=world.ground.bounds[::2], ylim=world.ground.bounds[1::2])
             above.plot(start.x, start.y, "o", color=PATH_COLOUR, ms=6, mec="white")
             draw_panorama(seen, view)
             save_picture(figure, folder / f"{name}.png")
@@ -172,7 +177,7 @@ MEASUREMENTS: dict[str, Measurement] = {
         },
     ),
     "worlds": Measurement(
-        f"the presets with seed {WORLD_SEED}", measure_worlds, {name: triangles_of(name) for name in WORLDS.builtin}
+        f"the presets with seed {WORLD_SEED}", measure_worlds, {name: triangles_of(name) for name in SHOWN}
     ),
     "figures": Measurement(
         "`python docs/draw_models.py`",

@@ -23,7 +23,7 @@ class DescribeCommand(MeshOptions):
 
     world: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="WORLD", help=WORLD)] = "tussock-field"
     ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = "flat"
-    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md)."""
+    """flat: the eye is above z = 0, or on generated hills. mesh: above the ground of the world's mesh, as of a scan (docs/your-data.md)."""
     max_slope_deg: float = 45.0
     """Steepest ground of a mesh that can be stood on."""
     seed: int = 0

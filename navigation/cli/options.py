@@ -27,8 +27,9 @@ from ..surroundings import Surroundings
 from ..training_setup import TrainingSetup
 
 WORLD = (
-    "A preset's name (tussock-field, meadow, scrub, tiny, hay-meadow, woodland, orchard), generated from a seed; its parameters may "
-    "follow, as in 'tussock-field field_width=20'. Or a file (.glb, .ply, .bin, .obj, ...). Or package.module:name of your own."
+    "A preset's name (tussock-field, meadow, scrub, tiny, hay-meadow, woodland, desert, orchard, arena), generated from a seed; its "
+    "parameters may follow, as in 'tussock-field hill_height=0.5'. Or a file (.glb, .ply, .bin, .obj, ...). Or "
+    "package.module:name of your own."
 )
 
 
@@ -98,7 +99,8 @@ class ViewOptions(MeshOptions):
     world_seed: int | None = None
     """Seed of a generated world. Default: --seed."""
     ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = default(Surroundings, "ground")
-    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md)."""
+    """flat: the eye is above z = 0, or above the hills of a generated world. mesh: it is above the ground of the world's mesh, as of a
+    scan (docs/your-data.md)."""
     max_slope_deg: float = degrees(default(Surroundings, "max_slope"))
     """Steepest ground of a mesh that can be stood and walked on."""
     altitude_m: float | None = None
@@ -130,8 +132,11 @@ class ViewOptions(MeshOptions):
     panorama, or the model file's."""
     cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
+    light: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Sun and sky, with shadows: 'sun azimuth_deg=90 elevation_deg=30', overcast, or 'daylight latitude_deg=51 longitude_deg=0
+    time=2026-06-21T10:30'. Azimuths are counter-clockwise from east. Default: the light in the world's colours, without shadows."""
     gaze: Annotated[str, tyro.conf.arg(metavar="level|body")] = default(Posture, "gaze")
-    """level: the head keeps the eye level. body: the eye pitches and rolls with the ground beneath the body (--ground mesh)."""
+    """level: the head keeps the eye level. body: the eye pitches and rolls with the ground beneath the body (--ground mesh, hills)."""
     body_length_m: float = default(Posture, "body_length")
     """Length over which the ground's slope tilts the body, for --gaze body."""
     pitch_noise_deg: float = degrees(default(Posture, "pitch_noise"))
@@ -154,8 +159,8 @@ class RouteOptions(ViewOptions):
     """What world is seen, through what eye, and a route through it."""
 
     ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh|route")] = default(Surroundings, "ground")
-    """flat: the eye is above z = 0. mesh: it is above the ground of the world's mesh, as of a scan (docs/your-data.md). route: it flies at
-    the heights of the route's points (column z_m)."""
+    """flat: the eye is above z = 0, or above the hills of a generated world. mesh: it is above the ground of the world's mesh, as of a
+    scan (docs/your-data.md). route: it flies at the heights of the route's points (column z_m)."""
     route: Path | None = None
     """A route file (.csv, .txt, .mat, .npy or AntWorld .bin); without it one is generated."""
     route_seed: int | None = None

@@ -140,7 +140,7 @@ class RouteCommand(MeshOptions):
 
     world: Annotated[str, tyro.conf.arg(help=WORLD)] = "tussock-field"
     ground: Annotated[str, tyro.conf.arg(metavar="flat|mesh")] = "flat"
-    """flat: the route is at z = 0. mesh: it is on the ground of the world's mesh, as of a scan (docs/your-data.md)."""
+    """flat: the route is at z = 0, or on generated hills. mesh: on the ground of the world's mesh, as of a scan (docs/your-data.md)."""
     max_slope_deg: float = 45.0
     """Steepest ground of a mesh that can be walked on."""
     seed: int = 0

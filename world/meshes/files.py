@@ -15,7 +15,7 @@ from ..file_kinds import MAKE_A_MESH, mesh_format
 from ..geometry import Bounds
 from ..origin import origin_of, shown
 from ..scene import World
-from ..world_data import DEFAULT_SKY, KEY, from_json
+from ..world_data import DEFAULT_SKY, KEY, from_json, standing
 from .appearance import appearance_of
 from .axes import turned_z_up
 from .gltf import prepared_gltf
@@ -181,7 +181,8 @@ def _world(path: Path, file: MeshFile, meshes: list, reading: MeshReading, up: s
             "field": _field(path, triangles),
             "origin_m": origin,
         }
-    return World(triangles=triangles, rgb=rgb, texturing=texturing, **own)
+        return World(triangles=triangles, rgb=rgb, texturing=texturing, **own)
+    return _understood(lambda: standing(World(triangles=triangles, rgb=rgb, texturing=texturing, **own), file.own))
 
 
 def _field(path: Path, triangles: np.ndarray) -> Bounds:
@@ -223,14 +224,7 @@ def _stored_step(scene) -> float:
 
 def _own_data(path: Path, data: Any, triangles: np.ndarray) -> dict[str, Any] | None:
     """What tussock wrote into a file; None where another program has moved its mesh since."""
-    try:
-        own = from_json(data)
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise FileError(
-            f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
-        ) from error
+    own = _understood(lambda: from_json(data))
     if any(own[name] is not None and len(rows) != len(triangles) for name, rows in _rows_of(own)):
         log.warning(
             f"{path}: it holds {len(triangles)} triangles, and its {KEY} metadata are of another number; which triangles are "
@@ -244,6 +238,18 @@ def _own_data(path: Path, data: Any, triangles: np.ndarray) -> dict[str, Any] | 
         f"{path}: its triangles are not where its {KEY} metadata says ({own['field']}); the metadata are ignored"
     )
     return None
+
+
+def _understood(read: Callable[[], Any]) -> Any:
+    """What `read` makes of the metadata of tussock. Raises FileError where they are damaged."""
+    try:
+        return read()
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise FileError(
+            f"its {KEY} metadata cannot be used ({first_line(error)[:160]}); write the world again"
+        ) from error
 
 
 def _rows_of(own: dict[str, Any]) -> list[tuple[str, Any]]:
