@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 TALL = 1.0  # m; what is higher stays: no mower cuts trees and tall shrubs
 LOWEST = 0.02  # m; what is left of all others at an amount of 1
-NOT_MOWN = ("stone",)  # kinds that no mower cuts
+NOT_MOWN = ("stone", "pebble")  # kinds that no mower cuts
 
 
 @settings

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .geometry import Route
 
 HIGHER, WIDER = 2.0, 1.5  # factors of growth at an amount of 1
-NOT_GROWING = ("stone", "litter", "leaf")  # kinds that PlantGroups calls plants
+NOT_GROWING = ("stone", "pebble", "litter", "leaf")  # kinds that PlantGroups calls plants
 
 
 def _names(value: Any) -> Any:

@@ -27,7 +27,7 @@ FLATTEST = math.radians(85.0)  # inclination of a blade in the strongest wind, i
 SLENDER = {"grass": 0.65, "culm": 0.65, "tussock": 0.55}
 # Bushy ones: angle by which their top turns (rad).
 BUSHY = {"herb": 0.4, "bush": 0.2, "tree": 0.08}
-STIFF = ("stone", "litter", "leaf")  # kinds that do not bend; litter and fallen leaves lie on the ground
+STIFF = ("stone", "pebble", "litter", "leaf")  # kinds that do not bend; litter and fallen leaves lie on the ground
 BY_BLADE = ("tussock",)  # kinds whose blades have feet of their own
 GROWTH_OF_ANGLE = 0.1  # exponent, over the distance from the foot; small, as the length of a blade changes with it
 SLENDERNESS = 3.0  # a plant of an unknown kind is slender if it is so many times as high as wide

@@ -156,15 +156,23 @@ def with_triangles(world: World, new: NewTriangles, plants: PlantGroups | None, 
     )
     ground = is_ground(world)[source]
     ground[len(source) - copied :] = False
-    return on_ground_of(changed, world, ground)
+    return on_ground_of(changed, world, ground, source[: len(source) - copied])
 
 
-def on_ground_of(changed: World, world: World, ground: Bool[np.ndarray, " n"]) -> World:
-    """A changed world with the ground of the world before: its triangles that are ground, and the flat rectangle."""
+def on_ground_of(changed: World, world: World, ground: Bool[np.ndarray, " n"], source: Int[np.ndarray, " m"]) -> World:
+    """A changed world with the ground of the world before: its triangles that are ground, and the flat rectangle.
+
+    Args:
+        changed: The world, without a terrain.
+        world: The world before.
+        ground: Which triangles are ground now.
+        source: What the first of its triangles were before, in ascending order.
+    """
     terrain = world.terrain
     if isinstance(terrain, Terrain):
         flat = terrain.is_ground[len(world.triangles) :]
-        terrain = Terrain(changed.surfaces()[0], np.concatenate([ground, flat]), terrain.max_slope)
+        part = terrain.part and tuple(np.searchsorted(source, terrain.part).tolist())
+        terrain = Terrain(changed.surfaces()[0], np.concatenate([ground, flat]), terrain.max_slope, part)
     return dataclasses.replace(changed, terrain=terrain)
 
 
@@ -253,4 +261,6 @@ def appended(
         plants=plants,
         terrain=None,
     )
-    return on_ground_of(changed, world, np.concatenate([is_ground(world), np.zeros(k, dtype=bool)]))
+    return on_ground_of(
+        changed, world, np.concatenate([is_ground(world), np.zeros(k, dtype=bool)]), np.arange(len(world.rgb))
+    )
