@@ -15,7 +15,16 @@ import torch
 from commands import printed, tussock
 from figure_laws import SAVE_FIGURE, not_drawn
 
-from tussock.navigation.benchmark.definition import BASE, BENCHMARK, BENCHMARKS, OF_ENTRY, QUICK, Benchmark
+from tussock.navigation.benchmark.definition import (
+    BASE,
+    BENCHMARK,
+    BENCHMARKS,
+    OF_ENTRY,
+    QUICK,
+    Benchmark,
+    Condition,
+    benchmark_of,
+)
 from tussock.navigation.benchmark.leaderboard import leaderboard, read_results
 from tussock.navigation.benchmark.learners import enter_learner, tasks
 from tussock.navigation.benchmark.models import enter, enter_named
@@ -28,7 +37,7 @@ from tussock.navigation.models import PerfectMemory, make_model
 from tussock.navigation.scan import best_turn, scan_window
 from tussock.navigation.sweeps.work import draw, learn, walk
 from tussock.render.eye import Eye
-from tussock.world.errors import InputError
+from tussock.world.errors import InputError, SettingError
 
 ROOT = Path(__file__).parents[1]
 MEASURED, PAGE = ROOT / "docs" / "benchmark", ROOT / "docs" / "benchmark.md"
@@ -41,6 +50,8 @@ TINY = Benchmark(
 DIGESTS = {
     "tussock-2": "71c2f5d9b5c3f8504a8a885bacb00cdd88cd308d88832c1fb1288d99e0823757",
     "tussock-2-quick": "ad70ca16e4ff30954f4428cbdf4f993e16f8b7c8eae10edd59f8c47696666f72",
+    "tussock-3": "c4bdf5f7bec87996c9366e43e0eadd0c758c88cf2a97d63ee2ae5411c196f592",
+    "tussock-3-quick": "1498bb4d78a16964be8f9c27e4b4835f1ec3cbf64bc93151334fbe19120799a0",
 }
 
 
@@ -86,12 +97,12 @@ def test_nothing_in_it_changes_unnoticed(monkeypatch):
     opened, generate = {}, Experiment.open_world_and_route
 
     def open_once(run):  # the worlds of one are among those of the other
-        key = json.dumps(settings_of(run), default=str)
+        key = run.world, run.seed, run.light, run.route_length
         return opened[key] if key in opened else opened.setdefault(key, generate(run))
 
     monkeypatch.setattr(Experiment, "open_world_and_route", open_once)
     assert {name: each.digest() for name, each in BENCHMARKS.items()} == DIGESTS
-    assert len(opened) == 3
+    assert len(opened) == 9
 
 
 def test_the_digest_depends_on_worlds_noises_and_displacements():
@@ -141,6 +152,41 @@ def test_its_runs_are_all_combinations():
     assert {round(math.degrees(run.body.heading_noise)) for run in runs} == {0, 20, 40}
     assert all(run.seed >= 1000 for run in runs)
     assert len(QUICK) < len(BENCHMARK) / 5
+
+
+def test_conditions_are_asked_in_each_world_from_each_displacement():
+    benchmark = BENCHMARKS["tussock-3"]
+    asked, runs = benchmark.asked(), benchmark.sweep("random").experiments
+    assert len(asked) == len(set(asked)) == len(runs) == len(benchmark)
+    names = [each.name for each in benchmark.conditions]
+    for name in names:
+        mine = [run for what, run in zip(asked, runs, strict=True) if what.condition == name]
+        assert len(mine) == len(benchmark.worlds) * len(benchmark.displacements)
+        assert {round(math.degrees(run.body.heading_noise)) for run in mine} == {20}
+    for what, run in zip(asked, runs, strict=True):
+        assert (what.world, what.seed, what.offset_m) == (run.world, run.seed, run.start_offset)
+        assert (run.test_change is None) == (what.condition in ("", "hills", "296 degrees", "ant's eye"))
+    assert [len(group) for group in benchmark.by_world()] == [9] * 6 + [3] * 6 * len(names)
+    with pytest.raises(SettingError, match="did you mean 'tussock-3'"):
+        benchmark_of("tusock-3")
+
+
+def test_a_result_says_what_an_entry_survives(tmp_path, cluster):
+    """Without plants, a memory of skylines does not arrive; with all of them, and under clouds, it does."""
+    conditions = (
+        Condition(name="bare", changes={"test_change": "removed amount=1"}, noise_deg=0.0),
+        Condition(name="cloudy", changes={"test_change": "clouds amount=1"}, noise_deg=0.0),
+    )
+    benchmark = dataclasses.replace(TINY, name="tiny-2", conditions=conditions, base=TINY.base.replace(light="sun"))
+    ((result, path),) = enter_named(["perfect-memory"], tmp_path, benchmark=benchmark, workers=cluster)
+    scores = result.scores()["by_condition"]
+    assert {name: score["runs"] for name, score in scores.items()} == {"": 4, "bare": 2, "cloudy": 2}
+    assert scores["bare"]["arrived"] < scores["cloudy"]["arrived"] == 2
+    assert [run.condition for run in read_result(path).runs] == [""] * 4 + ["bare"] * 2 + ["cloudy"] * 2
+    header = leaderboard([result]).splitlines()[0]
+    assert "| bare | cloudy |" in header
+    with pytest.raises(SettingError, match="changes worlds after learning"):
+        enter_learner(lambda env: None, "none", tmp_path / "policy", benchmark=benchmark)
 
 
 # Results

@@ -3,16 +3,20 @@
 import dataclasses
 import math
 
+import attrs
 import numpy as np
 import pytest
+import torch
 from scenes import hills, mesh_world, post, random_world, textured_world, world_of
 
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.senses import Readings
 from tussock.navigation.sky_compass import DorsalRim
 from tussock.render import Eye, open_renderer
+from tussock.render.changed_views import changed_world
 from tussock.render.lighting import LIFT, TEXEL, light_on_triangles, lit
 from tussock.render.shadows import in_the_sun
+from tussock.world.change import Change
 from tussock.world.errors import SettingError
 from tussock.world.files import read_world, write_world
 from tussock.world.geometry import wrap_angle
@@ -318,3 +322,43 @@ def test_a_walk_with_a_sky_compass_needs_a_sky():
     with pytest.raises(SettingError, match="--light"):
         Experiment(**flags).run()
     assert Experiment(**flags, light="sun azimuth_deg=120 elevation_deg=35").run().summary()["arrived"]
+
+
+# Changes
+
+
+def test_a_changed_world_is_lit_after_it_has_changed():
+    plain = World.generate("tiny", 3)
+    morning = lit(plain, Light(azimuth=math.radians(-20), elevation=math.radians(35)))
+    change = Change.parse("removed amount=0.5 | sun amount=0.5 hours=4 | clouds amount=0.25")
+    later = changed_world(morning, change, seed=2)
+    expected = lit(
+        plain.changed("removed amount=0.5", seed=2), Light(**attrs.asdict(morning.light.later(2.0)) | {"clouds": 0.25})
+    )
+    assert later.light == expected.light
+    assert np.array_equal(later.rgb, expected.rgb)
+    assert later.texturing.to_bytes() == expected.texturing.to_bytes()
+    assert changed_world(morning, Change.parse("sun amount=0 | clouds amount=0")) is morning
+    assert changed_world(plain, Change.parse("removed amount=0")) is plain
+
+
+def test_a_light_is_changed_only_where_it_is_known(tmp_path):
+    plain = World.generate("tiny", 3)
+    with pytest.raises(SettingError, match="--light"):
+        changed_world(plain, Change.parse("sun"))
+    with pytest.raises(SettingError, match="change it first"):
+        lit(plain, LOW).changed("removed amount=0.5")
+    write_world(lit(plain, LOW), tmp_path / "lit.glb")
+    with pytest.raises(SettingError, match="lit by a sun already"):
+        changed_world(read_world(tmp_path / "lit.glb"), Change.parse("clouds amount=0.5"))
+
+
+def test_a_walk_learns_in_the_morning_and_walks_at_noon():
+    flags = {"world": "tiny", "seed": 3, "route_length": 1.5, "eye": Eye(width=90, height=20), "route_seed": 1}
+    flags |= {"light": "sun azimuth_deg=-20 elevation_deg=30", "encoding": "grey"}
+    usual = Experiment(**flags)
+    later = usual.replace(test_change="sun hours=4")
+    with usual.opened() as one, later.opened() as other:
+        assert torch.equal(one.views, other.views)
+        assert other.renderer.world.light.elevation > one.renderer.world.light.elevation + 0.3
+        assert np.array_equal(one.route.xy, other.route.xy)
