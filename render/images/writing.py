@@ -151,6 +151,7 @@ def _metadata(renderer: Renderer, poses: Float[np.ndarray, "n 3"], grid: Grid | 
     triangles, rgb = world.surfaces()
     scene = triangles.tobytes() + rgb.tobytes() + bytes([*world.sky_rgb, world.double_sided])
     scene += world.texturing.to_bytes() if world.texturing else b""
+    scene += repr(world.light).encode() if world.light else b""  # its sky is not in the colours
     tussock = {
         "world": hashlib.sha256(scene).hexdigest(),
         "poses": hashlib.sha256(poses.tobytes()).hexdigest(),
