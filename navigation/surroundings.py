@@ -1,6 +1,5 @@
 """Where an experiment takes place: a world or image databases, a route, and the eye that sees them. Light to import."""
 
-import dataclasses
 import logging
 import math
 from functools import cache
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 
     from tussock.render.renderer import Renderer
     from tussock.world.eye_change import EyeMount
-    from tussock.world.flight import Flight
     from tussock.world.geometry import Route
     from tussock.world.scene import World
     from tussock.world.specs import Spec
@@ -192,51 +190,9 @@ class Surroundings:
             from tussock.render.images.folders import world_of
 
             return world_of(self.route_database, self.grid_database)
-        world = self._world_and_ground()
-        if self.light is None:
-            return world
-        from tussock.render.lighting import lit
+        from .opened_world import lit_world
 
-        return lit(world, self.light.make())
-
-    def _world_and_ground(self) -> "World":
-        """The world, with what agents stand or fly on."""
-        from tussock.world.files import open_world
-        from tussock.world.ground_check import remark_on_ground
-        from tussock.world.params import is_generated
-        from tussock.world.scene import World
-
-        self.check_reading()
-        seed = self.seed if self.world_seed is None else self.world_seed
-        world = self.world if isinstance(self.world, World) else open_world(str(self.world), seed, self.reading)
-        world = dataclasses.replace(world, double_sided=False) if self.cull_back_faces else world
-        if self.ground == "mesh":
-            return world.on_mesh(self.max_slope)
-        if self.ground == "route" or self.altitude is not None:
-            return world.flown(self._flight(world))
-        if world.terrain is not None:
-            return world if isinstance(self.world, World) else world.on_mesh(self.max_slope)
-        if isinstance(self.world, str) and not is_generated(self.world):
-            remark_on_ground(world, self.world, self.eye.z)
-        return world
-
-    def _flight(self, world: "World") -> "Flight":
-        """Where agents fly, below their eye. Raises SettingError where the route has no heights, or is under the ground."""
-        import numpy as np
-
-        from tussock.world.flight import Flight, check_flight
-
-        if self.altitude is not None:
-            places = np.array([[0.0, 0.0, self.altitude]])
-        else:
-            route = self._given_route(world)
-            if route is None or route.heights is None:
-                raise SettingError(
-                    "ground route flies at the heights of a route: give one with a column z_m that has a number in each row, or an altitude"
-                )
-            places = np.column_stack([route.xy, route.heights])
-        check_flight(world, places)
-        return Flight(places - [0, 0, self.eye.z])
+        return lit_world(self)
 
     def open_route(self, world: "World") -> "Route":
         """The route through the world, or that of the database. Raises InputError where it leaves the world, or where none is found."""
@@ -246,7 +202,7 @@ class Surroundings:
             return route_of(self.route_database, self.headings)
         from tussock.world.routes import check_route, generate_route
 
-        route = self._given_route(world)
+        route = self.given_route(world)
         if route is None:
             route = generate_route(world, self.seed if self.route_seed is None else self.route_seed, self.route_length)
         elif (
@@ -262,7 +218,7 @@ class Surroundings:
         check_route(world, route)
         return route
 
-    def _given_route(self, world: "World") -> "Route | None":
+    def given_route(self, world: "World") -> "Route | None":
         """The route that was given, in the world's own coordinates; None where it is to be generated."""
         from tussock.world.geometry import Route
         from tussock.world.origin import local_route
