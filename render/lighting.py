@@ -16,9 +16,9 @@ from tussock.world.light import Light
 from tussock.world.scene import Ground, World
 from tussock.world.textures import Texture, Texturing, product_table, to_display
 
-from .shadows import in_the_sun
+from .shadows import in_the_sun, in_the_sun_on_a_level
 
-POINTS = {4: 4e-4, 16: math.inf}  # points on a triangle, and the area up to which it has so many (m^2)
+POINTS = {1: 4e-4, 4: 25e-4, 16: math.inf}  # points on a triangle, and the area up to which it has so many (m^2)
 TEXEL = 0.01  # m; of the ground in the field and BORDER around it
 BORDER = 1.0  # m
 MAX_TEXELS = 1_000_000  # of a part of the ground; of a larger part, they are larger
@@ -152,13 +152,12 @@ def _quad(part: Bounds) -> Float32[np.ndarray, "2 3 3"]:
 def _ground_texture(world: World, ground: Ground, part: Bounds, texel: float, light: Light) -> Texture:
     """A part of the ground in sun and shadow, seen from above with north at the top."""
     columns, rows = np.maximum(1, np.ceil(part.size / texel)).astype(int).tolist()
-    x = part[0] + (np.arange(columns) + 0.5) / columns * part.size[0]
-    y = part[3] - (np.arange(rows) + 0.5) / rows * part.size[1]
-    points = np.stack([*np.meshgrid(x, y), np.full((rows, columns), LIFT)], axis=-1).reshape(-1, 3)
-    free = in_the_sun(world, points, light.sun) if light.direct else np.zeros(len(points), bool)
+    free = np.zeros((rows, columns), bool)
+    if light.direct:
+        free = in_the_sun_on_a_level(world, part, rows, columns, LIFT, light.sun)
     up = np.array([[0.0, 0.0, 1.0]])
     shade, sun = (np.rint(255 * to_display(light.on(up, share))).astype(np.uint8)[0] for share in (0.0, 1.0))
     rgba = np.empty((rows, columns, 4), np.uint8)
-    rgba[..., :3] = product_table()[np.array(ground.rgb), np.where(free, sun, shade).reshape(rows, columns, 1)]
+    rgba[..., :3] = product_table()[np.array(ground.rgb), np.where(free, sun, shade)[..., None]]
     rgba[..., 3] = 255
     return Texture(rgba=rgba, wrap=("clamp", "clamp"), filter="nearest")

@@ -15,11 +15,11 @@ from tussock.navigation.sky_compass import DorsalRim
 from tussock.render import Eye, open_renderer
 from tussock.render.changed_views import changed_world
 from tussock.render.lighting import LIFT, TEXEL, light_on_triangles, lit
-from tussock.render.shadows import in_the_sun
+from tussock.render.shadows import in_the_sun, in_the_sun_on_a_level
 from tussock.world.change import Change
 from tussock.world.errors import SettingError
 from tussock.world.files import read_world, write_world
-from tussock.world.geometry import wrap_angle
+from tussock.world.geometry import Bounds, wrap_angle
 from tussock.world.light import Light, daylight, light_spec, polarisation, sky_luminance
 from tussock.world.scene import World
 from tussock.world.textures import Texture
@@ -106,6 +106,19 @@ def test_rays_to_the_sun_agree_with_embree():
         hit = RayMeshIntersector(mesh, scale_to_box=False).intersects_any(points, np.tile(light.sun, (len(points), 1)))
         assert (free == ~hit).mean() > 0.9995
         assert 0.05 < free.mean() < 0.99
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.7, -2.5])
+@pytest.mark.parametrize("elevation", [0.05, 0.5, 1.4, math.pi / 2])
+def test_shadows_on_a_level_are_those_of_rays(azimuth, elevation):
+    world, sun = random_world(5, 400), Light(azimuth=azimuth, elevation=elevation).sun
+    part, rows, columns = Bounds(-3.0, -2.0, 2.0, 3.0), 70, 90
+    x = -3.0 + (np.arange(columns) + 0.5) * 5 / columns
+    y = 3.0 - (np.arange(rows) + 0.5) * 5 / rows
+    points = np.stack([*np.meshgrid(x, y), np.full((rows, columns), 0.05)], axis=-1)
+    free = in_the_sun(world, points.reshape(-1, 3), sun).reshape(rows, columns)
+    assert (free == in_the_sun_on_a_level(world, part, rows, columns, 0.05, sun)).mean() > 0.9995
+    assert 0.01 < free.mean() < 0.99
 
 
 def test_the_shadow_of_a_pole_has_the_right_direction_and_length():
