@@ -8,7 +8,7 @@ import tyro
 
 from tussock.world.errors import SettingError
 
-from .options import WorkerOptions
+from .command import WorkerOptions
 from .terminal import message, progress
 
 

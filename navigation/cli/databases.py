@@ -12,7 +12,8 @@ from tussock.render.posture import Posture
 from tussock.world.errors import InputError, SettingError
 
 from ..training_setup import ROUTE_SPACING
-from .options import Command, RouteOptions, ViewOptions
+from .command import Command
+from .options import RouteOptions, ViewOptions
 from .terminal import message, progress
 from .worlds import numbers
 

@@ -15,7 +15,8 @@ from tussock.render.posture import Posture
 from tussock.world.errors import FileError, SettingError
 
 from ..experiment_fields import MODEL_SUFFIX
-from .options import ChangeOptions, Command, LearningOptions, ModelOptions, RunOptions
+from .command import Command
+from .options import ChangeOptions, LearningOptions, ModelOptions, RunOptions
 from .terminal import message, progress, progress_of_parts
 from .unimported import class_at
 

@@ -10,7 +10,7 @@ import tyro
 from tussock.world.errors import SettingError
 
 from ..experiment_settings import width_and_height
-from .options import Command
+from .command import Command
 from .terminal import held_messages, progress
 from .worlds import numbers
 

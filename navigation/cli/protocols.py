@@ -12,7 +12,8 @@ import tyro
 from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
 
-from .options import WORLD, MeshOptions, WorkerOptions, flags_of
+from .command import WorkerOptions
+from .options import WORLD, MeshOptions, flags_of
 from .terminal import message, progress
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import tyro
 
-from .options import Command, flags_of
+from .command import Command
+from .options import flags_of
 from .terminal import message, progress
 
 

@@ -9,7 +9,8 @@ import tyro
 
 from tussock.world.errors import SettingError
 
-from .options import Command, WorkerOptions, import_used
+from .command import Command, WorkerOptions
+from .options import import_used
 from .terminal import message, progress
 
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .options import Command, flags_of
+from .command import Command
+from .options import flags_of
 from .terminal import progress
 
 

@@ -10,7 +10,8 @@ import tyro
 from tussock.world.errors import FileError, SettingError
 
 from ..surroundings import Surroundings
-from .options import WORLD, Command, MeshOptions, ViewOptions
+from .command import Command
+from .options import WORLD, MeshOptions, ViewOptions
 from .terminal import message
 
 if TYPE_CHECKING:
