@@ -3,6 +3,7 @@
 import dataclasses
 from typing import TYPE_CHECKING
 
+import attrs
 import numpy as np
 
 from tussock.world.errors import SettingError
@@ -17,32 +18,41 @@ if TYPE_CHECKING:
 
 
 def lit_world(surroundings: "Surroundings") -> World:
-    """The world in its light."""
-    world = world_and_ground(surroundings)
-    if surroundings.light is None:
+    """The world in its light. One in memory that is lit already stands on the ground that is asked for, and is lit anew."""
+    light = None if surroundings.light is None else surroundings.light.make()
+    given = surroundings.world if isinstance(surroundings.world, World) else None
+    if given is None or given.unlit is None or light is not None:
+        world = world_and_ground(surroundings, given)
+    else:
+        before = dataclasses.replace(
+            given.unlit, sky_rgb=given.sky_rgb, field=given.field, double_sided=given.double_sided
+        )
+        world, light = world_and_ground(surroundings, before), given.light
+        if world is before:
+            return given
+    if light is None:
         return world
     from tussock.render.lighting import lit  # loads numba, which a world without a light need not wait for
 
-    return lit(world, surroundings.light.make())
+    return lit(world, light)
 
 
-def world_and_ground(surroundings: "Surroundings") -> World:
-    """The world, with what agents stand or fly on."""
+def world_and_ground(surroundings: "Surroundings", world: World | None) -> World:
+    """The world, with what agents stand or fly on. world: the one in memory; None: it is opened."""
     surroundings.check_reading()
-    seed = surroundings.seed if surroundings.world_seed is None else surroundings.world_seed
-    world = (
-        surroundings.world
-        if isinstance(surroundings.world, World)
-        else open_world(str(surroundings.world), seed, surroundings.reading)
-    )
+    in_memory = world is not None
+    if world is None:
+        seed = surroundings.seed if surroundings.world_seed is None else surroundings.world_seed
+        world = open_world(str(surroundings.world), seed, surroundings.reading)
     world = dataclasses.replace(world, double_sided=False) if surroundings.cull_back_faces else world
     if surroundings.ground == "mesh":
         return world.on_mesh(surroundings.max_slope)
     if surroundings.ground == "route" or surroundings.altitude is not None:
         return world.flown(flight_in(surroundings, world))
     if world.terrain is not None:
-        return world if isinstance(surroundings.world, World) else world.on_mesh(surroundings.max_slope)
-    if isinstance(surroundings.world, str) and not is_generated(surroundings.world):
+        keeps = in_memory and surroundings.max_slope == attrs.fields_dict(type(surroundings))["max_slope"].default
+        return world if keeps else world.on_mesh(surroundings.max_slope)
+    if not in_memory and not is_generated(surroundings.world):
         remark_on_ground(world, surroundings.world, surroundings.eye.z)
     return world
 

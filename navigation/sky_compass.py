@@ -22,7 +22,8 @@ from tussock.world.settings import number, settings, switch, whole
 
 from .sense_models import Senses
 
-MIN_SUM = 1e-6  # of a unit; what is less is no direction
+MIN_SUM = 1e-6  # of a unit; a smaller sum has no direction, as under an even sky
+MIN_RING = 5  # units in a ring; the sum over fewer, evenly spaced, is not 0 under an even sky
 
 
 @settings
@@ -30,14 +31,14 @@ class DorsalRim(Senses):
     """A polarisation compass. It must have a sky: a world with a light. Plants above do not cover it.
 
     Attributes:
-        units: Their number, spread evenly over the dome.
+        units: Their number, spread over the dome in rings.
         dome: Angle from one side of the dome to the other (rad).
         unit_noise: Standard deviation of what each unit reads (of -1 to 1), new at each reading.
         sees_sun: Whether the brighter half of the sky tells the heading from its opposite. Otherwise a walk begins with either at
             random, and an agent takes the one that is nearer to what it read before.
     """
 
-    units: int = whole(60, low=3, high=10_000, unit="units")
+    units: int = whole(60, low=5, high=10_000, unit="units")
     dome: float = number(np.radians(56.0), above=0, high=np.pi, unit="rad")
     unit_noise: float = number(0.01, low=0, unit="share")
     sees_sun: bool = switch(True)
@@ -89,7 +90,16 @@ class DorsalRim(Senses):
 
 @cache
 def _dome(units: int, width: float) -> Float[np.ndarray, "units 3"]:
-    """Directions of units in the frame of the body (ahead, left, up), spread evenly: a spiral with the golden angle."""
-    z = 1 - (np.arange(units) + 0.5) / units * (1 - np.cos(width / 2))
-    turn = np.arange(units) * np.pi * (3 - np.sqrt(5))
-    return np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
+    """Directions of units in the frame of the body (ahead, left, up): rings about the zenith, the more units the wider they are."""
+    rings = min(max(1, round(np.sqrt(units) / 2)), units // MIN_RING)
+    zenith = (np.arange(rings) + 0.5) / rings * width / 2
+    share = np.sin(zenith) / np.sin(zenith).sum()
+    counts = MIN_RING + np.floor(share * (units - MIN_RING * rings)).astype(int)
+    counts[-1] += units - counts.sum()
+    directions = []
+    for angle, count in zip(zenith.tolist(), counts.tolist(), strict=True):
+        turn = 2 * np.pi * np.arange(count) / count
+        directions.append(
+            np.column_stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.full(count, np.cos(angle))])
+        )
+    return np.concatenate(directions)

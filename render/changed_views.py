@@ -1,5 +1,6 @@
 """Views of a world that has changed since its views were learned."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,11 +35,13 @@ def changed_world(world: World, change: Change, seed: int = 0, route: Route | No
                 f"{str(change)!r} changes the sun, and this world has none: give --light, such as --light sun"
             )
         return change.apply(world, seed, route, state)
-    before, light = world.unlit or world, change.lit(world.light)
+    before, light = world, change.lit(world.light)
+    if world.unlit is not None:  # what was set since then holds on
+        before = dataclasses.replace(
+            world.unlit, sky_rgb=world.sky_rgb, field=world.field, double_sided=world.double_sided
+        )
     changed = change.apply(before, seed, route, state)
-    if changed is before and light == world.light:
-        return world
-    return lit(changed, light)
+    return world if changed is before and light == world.light else lit(changed, light)
 
 
 class ChangedViews:

@@ -1,24 +1,26 @@
 """A world in the light of a sun and a sky: shadows and brightness become part of the colours of its triangles and of its ground.
 
 Then every renderer draws them, at no cost. A triangle has one share of sunlight, that of POINTS points spread over it; the flat
-ground has a texture with one ray in each texel. The mathematics of light is in world/light.py.
+ground has textures, with sun or shadow in each texel. The mathematics of light is in world/light.py.
 """
 
 import dataclasses
 import math
 
 import numpy as np
-from jaxtyping import Float, Float32, UInt8
+from jaxtyping import Float, UInt8
 
 from tussock.world.errors import SettingError
 from tussock.world.geometry import Bounds
+from tussock.world.ground import Ground, GroundPart, shadow_picture
 from tussock.world.light import Light
-from tussock.world.scene import Ground, World
+from tussock.world.scene import World
+from tussock.world.terrain import Terrain
 from tussock.world.textures import Texture, Texturing, product_table, to_display
 
 from .shadows import in_the_sun, in_the_sun_on_a_level
 
-POINTS = {1: 4e-4, 4: 25e-4, 16: math.inf}  # points on a triangle, and the area up to which it has so many (m^2)
+POINTS = {1: 4e-4, 4: 25e-4, 16: math.inf}  # points on a triangle, and the largest area of such triangles (m^2)
 TEXEL = 0.01  # m; of the ground in the field and BORDER around it
 BORDER = 1.0  # m
 MAX_TEXELS = 1_000_000  # of a part of the ground; of a larger part, they are larger
@@ -33,13 +35,19 @@ def lit(world: World, light: Light) -> World:
     Raises SettingError for a world that is lit already.
     """
     if world.light is not None:
-        raise SettingError("the world is lit by a sun already; light the world that it was made of (World.unlit)")
+        raise SettingError(
+            "the world is lit by a sun already; "
+            + ("write it without a light, and give --light" if world.unlit is None else "light World.unlit")
+        )
     reflectance = world.rgb if world.reflectance is None else world.reflectance
     brightness = np.rint(255 * to_display(light_on_triangles(world, light))).astype(np.uint8)
     rgb = product_table()[reflectance, brightness[:, None]]
     texturing = world.texturing and _shaded(world.texturing, reflectance, brightness)
-    lit_world = dataclasses.replace(world, rgb=rgb, texturing=texturing, light=light, unlit=world)
-    return lit_world if world.ground is None else _with_ground(lit_world, world, world.ground, light)
+    ground = world.ground and _lit_ground(world, world.ground, light)
+    lit_world = dataclasses.replace(world, rgb=rgb, texturing=texturing, ground=ground, light=light, unlit=world)
+    if ground is None or not isinstance(world.terrain, Terrain):
+        return lit_world
+    return dataclasses.replace(lit_world, terrain=_on_parts(world.terrain, lit_world))
 
 
 def light_on_triangles(world: World, light: Light) -> Float[np.ndarray, " n"]:
@@ -85,36 +93,21 @@ def _shaded(texturing: Texturing, rgb: UInt8[np.ndarray, "n 3"], brightness: UIn
     return dataclasses.replace(texturing, colours=darker)
 
 
-def _with_ground(lit_world: World, world: World, ground: Ground, light: Light) -> World:
-    """A lit world whose ground is textured triangles, in place of the ground of the world that it was made of."""
+def _lit_ground(world: World, ground: Ground, light: Light) -> Ground:
+    """The ground with sun and shadow on it."""
     parts = _parts(ground.bounds, world.field.widened(BORDER))
-    textures = tuple(_ground_texture(world, ground, part, texel, light) for part, texel in parts)
-    corners = [_quad(part) for part, _ in parts]
-    n, uv = 2 * len(parts), np.array([[(0, 1), (1, 1), (1, 0)], [(0, 1), (1, 0), (0, 0)]], np.float32)
-    old = lit_world.texturing or Texturing(
-        textures=(),
-        index=np.full(len(world.triangles), -1, np.int32),
-        uv=np.zeros((len(world.triangles), 3, 2), np.float32),
-    )
-    texturing = Texturing(
-        textures=old.textures + textures,
-        index=np.concatenate([old.index, len(old.textures) + np.arange(n, dtype=np.int32) // 2]).astype(np.int32),
-        uv=np.concatenate([old.uv, np.tile(uv, (len(parts), 1, 1))]),
-        colours=None if old.colours is None else np.concatenate([old.colours, np.full((n, 3, 4), 255, np.uint8)]),
-    )
-    means = [np.rint(texture.rgba[..., :3].mean(axis=(0, 1))) for texture in textures]
-    groups = world.plants and dataclasses.replace(
-        world.plants, of=np.concatenate([world.plants.of, np.full(n, -1, np.int32)])
-    )
+    pictures = [_ground_texture(world, ground, part, texel, light) for part, texel in parts]
     return dataclasses.replace(
-        lit_world,
-        triangles=np.concatenate([world.triangles, *corners]),
-        rgb=np.concatenate([lit_world.rgb, np.repeat(means, 2, axis=0).astype(np.uint8)]),
-        reflectance=None,
-        ground=None,
-        texturing=texturing,
-        plants=groups,
+        ground, parts=tuple(GroundPart(part, picture) for (part, _), picture in zip(parts, pictures, strict=True))
     )
+
+
+def _on_parts(terrain: Terrain, lit_world: World) -> Terrain:
+    """What agents stand on, if it is the flat ground as well: its triangles are more in a lit world."""
+    n = len(lit_world.triangles)
+    triangles, _ = lit_world.surfaces()
+    is_ground = np.concatenate([terrain.is_ground[:n], np.full(len(triangles) - n, terrain.is_ground[n:].any())])
+    return Terrain(triangles, is_ground, terrain.max_slope, terrain.part)
 
 
 def _parts(ground: Bounds, fine: Bounds) -> list[tuple[Bounds, float]]:
@@ -142,13 +135,6 @@ def _texel(part: Bounds, wanted: float, most: int) -> float:
     return max(wanted, math.sqrt(float(np.prod(part.size)) / most))
 
 
-def _quad(part: Bounds) -> Float32[np.ndarray, "2 3 3"]:
-    """A rectangle of the ground as two triangles that face up."""
-    x0, y0, x1, y1 = part
-    a, b, c, d = (x0, y0, 0), (x1, y0, 0), (x1, y1, 0), (x0, y1, 0)
-    return np.array([(a, b, c), (a, c, d)], dtype=np.float32)
-
-
 def _ground_texture(world: World, ground: Ground, part: Bounds, texel: float, light: Light) -> Texture:
     """A part of the ground in sun and shadow, seen from above with north at the top."""
     columns, rows = np.maximum(1, np.ceil(part.size / texel)).astype(int).tolist()
@@ -160,4 +146,4 @@ def _ground_texture(world: World, ground: Ground, part: Bounds, texel: float, li
     rgba = np.empty((rows, columns, 4), np.uint8)
     rgba[..., :3] = product_table()[np.array(ground.rgb), np.where(free, sun, shade)[..., None]]
     rgba[..., 3] = 255
-    return Texture(rgba=rgba, wrap=("clamp", "clamp"), filter="nearest")
+    return shadow_picture(rgba)

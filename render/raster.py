@@ -126,10 +126,11 @@ def _scene(world: World, cubemap: Cubemap) -> tuple[Any, Any]:
     scene = pyrender.Scene(bg_color=[*(c / 255 for c in sky), 0.0])
     triangles, rgb = world.surfaces()
     primitives = []
-    if world.texturing is not None:
-        primitives = _textured(world.triangles, world.texturing, world.double_sided, _as_texture(cubemap.ray_offsets()))
-        plain = np.ones(len(triangles), dtype=bool)  # and the ground
-        plain[: len(world.triangles)] = (world.texturing.index < 0) & (world.texturing.colours is None)
+    if (texturing := world.surface_texturing()) is not None:
+        n = len(texturing.index)
+        primitives = _textured(triangles[:n], texturing, world.double_sided, _as_texture(cubemap.ray_offsets()))
+        plain = np.ones(len(triangles), dtype=bool)  # and a ground of one colour
+        plain[:n] = (texturing.index < 0) & (texturing.colours is None)
         triangles, rgb = triangles[plain], rgb[plain]
     if len(triangles):
         primitives.append(_coloured(triangles, np.repeat(rgb, 3, axis=0), world.double_sided))

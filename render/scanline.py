@@ -36,7 +36,7 @@ from tussock.world.scene import World
 from .cores import core_count
 from .eye import Eye
 from .poses import AnyPoses, Views, frames_of, poses_of_eye
-from .scanline_kernels import draw_views
+from .scanline_kernels import draw_views, find_hits
 from .scene_arrays import Scene
 from .sky import add_sky
 
@@ -112,11 +112,12 @@ class ScanlineRenderer:
         if self.eye.rays != 1:
             raise SettingError(f"hits are of single rays, and this eye has {self.eye.rays} in a pixel; give samples=1")
         eyes, (width, height) = poses_of_eye(self.world, self.eye, poses), (self.eye.width, self.eye.height)
-        keys, view = np.empty((width, height), dtype=np.int64), np.empty((1, height, width), dtype=np.uint32)
+        keys = np.empty((width, height), dtype=np.int64)
+        triangles, rays, _, lookup = self._scene
         away, label = np.empty((len(eyes), height, width)), np.empty((len(eyes), height, width), dtype=np.int64)
         for k in range(len(eyes)):
-            pose = eyes[k : k + 1]
-            draw_views(*self._scene, pose, frames_of(pose) if pose[0, 4:].any() else None, 0, width, keys, view)
+            frame = frames_of(eyes[k : k + 1])[0] if eyes[k, 4:].any() else None
+            find_hits(triangles, rays, lookup, eyes[k], frame, keys)
             nearness = (
                 (keys >> 32).astype(np.int32).view(np.float32)
             )  # the inverse distance along the first two axes of the eye

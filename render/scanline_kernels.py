@@ -180,6 +180,21 @@ def find_directions(azimuths, heading, directions):
 
 
 @compiled(uses=(colour_kernels, culling_kernels))
+def find_hits(triangles, rays, lookup, pose, frame, keys):
+    """Write the `key_of` of what each ray of a view meets into keys (width, height). The arguments are those of `draw_views`."""
+    azimuths, tangents, top, rows_per_rad, _ = rays
+    width, height = keys.shape
+    directions = np.empty((2, width))
+    if frame is None:
+        view = View(pose[0], pose[1], pose[3], pose[2], top, rows_per_rad, width, height, 0, width)
+    else:
+        view = View(0.0, 0.0, 0.0, 0.0, top, rows_per_rad, width, height, 0, width)
+    find_directions(azimuths, view.heading, directions)
+    keys[:] = 0
+    _draw(triangles, directions, tangents, view, frame, keys, lookup)
+
+
+@compiled(uses=(colour_kernels, culling_kernels))
 def _draw_view(triangles, rays, paint, lookup, view, frame, directions, keys, pixels):
     """Draw one view, see `draw_views`. frame: that of a tilted eye, or None."""
     azimuths, tangents, _, _, n = rays

@@ -89,7 +89,7 @@ class Lookup(NamedTuple):
     @classmethod
     def of(cls, world: World) -> "Lookup | None":
         """That of a world; None if it has no textures."""
-        texturing = world.texturing
+        texturing = world.surface_texturing()
         if texturing is None:
             return None
         triangles, _ = world.surfaces()

@@ -524,7 +524,7 @@ def test_an_eye_that_is_mounted_otherwise_sees_what_an_eye_there_sees(tiny):
         seen = views.render(pose)
         assert views.world is tiny
         assert training_source(views) is renderer
-    with open_renderer(tiny, dataclasses.replace(EYE, z=0.015) if dataclasses.is_dataclass(EYE) else run.eye) as plain:
+    with open_renderer(tiny, run.eye) as plain:
         there = np.array([[1.0, 1.2, 0.4 + math.radians(6), 0.015, 0.0, 0.0]])
         np.testing.assert_array_equal(seen, plain.render(there))
 

@@ -179,12 +179,15 @@ def test_a_result_says_what_an_entry_survives(tmp_path, cluster):
     )
     benchmark = dataclasses.replace(TINY, name="tiny-2", conditions=conditions, base=TINY.base.replace(light="sun"))
     ((result, path),) = enter_named(["perfect-memory"], tmp_path, benchmark=benchmark, workers=cluster)
+    assert all(run.error is None for run in result.runs)
     scores = result.scores()["by_condition"]
     assert {name: score["runs"] for name, score in scores.items()} == {"": 4, "bare": 2, "cloudy": 2}
     assert scores["bare"]["arrived"] < scores["cloudy"]["arrived"] == 2
     assert [run.condition for run in read_result(path).runs] == [""] * 4 + ["bare"] * 2 + ["cloudy"] * 2
     header = leaderboard([result]).splitlines()[0]
     assert "| bare | cloudy |" in header
+    with pytest.raises(SettingError, match="changes worlds after learning"):
+        next(tasks(benchmark))
     with pytest.raises(SettingError, match="changes worlds after learning"):
         enter_learner(lambda env: None, "none", tmp_path / "policy", benchmark=benchmark)
 

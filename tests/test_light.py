@@ -15,12 +15,15 @@ from tussock.navigation.sky_compass import DorsalRim
 from tussock.render import Eye, open_renderer
 from tussock.render.changed_views import changed_world
 from tussock.render.lighting import LIFT, TEXEL, light_on_triangles, lit
+from tussock.render.occlusion import covered_within
+from tussock.render.scanline import ScanlineRenderer
 from tussock.render.shadows import in_the_sun, in_the_sun_on_a_level
 from tussock.world.change import Change
 from tussock.world.errors import SettingError
 from tussock.world.files import read_world, write_world
 from tussock.world.geometry import Bounds, wrap_angle
 from tussock.world.light import Light, daylight, light_spec, polarisation, sky_luminance
+from tussock.world.obstacles import clearance
 from tussock.world.scene import World
 from tussock.world.textures import Texture
 
@@ -124,7 +127,7 @@ def test_shadows_on_a_level_are_those_of_rays(azimuth, elevation):
 def test_the_shadow_of_a_pole_has_the_right_direction_and_length():
     height, light = 0.5, Light(azimuth=math.radians(70), elevation=math.radians(40))
     pole = world_of(post(0, 0, 0, height=height, width=0.02), np.full((10, 3), 100))
-    texture = lit(pole, light).texturing.textures[0].rgba[..., 0].astype(int)
+    texture = lit(pole, light).ground.parts[0].texture.rgba[..., 0].astype(int)
     rows, columns = np.nonzero(texture < (texture.min() + texture.max()) / 2)
     left, low, right, high = -3.0, -3.0, 3.0, 3.0
     x = left + (columns + 0.5) * (right - left) / texture.shape[1]
@@ -202,12 +205,16 @@ def test_the_angle_of_polarisation_equals_the_formula_of_spherical_trigonometry(
 # Lit worlds
 
 
+def pictures(world: World) -> list[bytes]:
+    """What is on the ground of a lit world."""
+    return [part.texture.rgba.tobytes() for part in world.ground.parts]
+
+
 def test_a_light_changes_colours_and_no_shape():
     world = World.generate("tiny", 3)
     bright = lit(world, LOW)
-    n = len(world.triangles)
-    assert np.array_equal(bright.triangles[:n], world.triangles)
-    assert np.array_equal(bright.plants.of[:n], world.plants.of)
+    assert np.array_equal(bright.triangles, world.triangles)
+    assert np.array_equal(bright.plants.of, world.plants.of)
     poses = [(1.0, 1.0, 0.5), (2.0, 1.2, -2.0)]
     eye = Eye(width=90, height=24, samples=2)
     with open_renderer(world, eye, "cpu") as plain, open_renderer(bright, eye, "cpu") as sunny:
@@ -216,14 +223,52 @@ def test_a_light_changes_colours_and_no_shape():
     assert (before[..., :3] != after[..., :3]).mean() > 0.5
     again = lit(World.generate("tiny", 3), LOW)
     assert again.rgb.tobytes() == bright.rgb.tobytes()
-    assert again.texturing.to_bytes() == bright.texturing.to_bytes()
+    assert pictures(again) == pictures(bright)
     with pytest.raises(SettingError, match="lit by a sun already"):
         lit(bright, LOW)
 
 
-def test_the_route_through_a_lit_world_is_that_through_the_world():
-    dark, bright = (Experiment(world="tiny", seed=3, route_length=2.0, light=light) for light in (None, LOW))
-    assert np.array_equal(dark.open_world_and_route()[1].xy, bright.open_world_and_route()[1].xy)
+@pytest.mark.parametrize(
+    "settings", [{}, {"ground": "mesh"}, {"world": "tiny hill_height=0.5"}, {"world": "arena"}, {"altitude": 0.4}]
+)
+def test_a_lit_world_is_the_world_in_all_but_its_looks(settings):
+    """Ground, obstacles, what stands near, and routes."""
+    settings = {"world": "tiny", "seed": 3, "route_length": 0.8} | settings
+    dark, bright = (Experiment(**settings, light=light) for light in (None, LOW))
+    (world, route), (lit_world, same) = dark.open_world_and_route(), bright.open_world_and_route()
+    assert np.array_equal(route.xy, same.xy)
+    xy = route.at(np.linspace(0, 0.7, 8))[:, :2] + [0.05, -0.1]
+    assert np.array_equal(world.ground_height(xy), lit_world.ground_height(xy), equal_nan=True)
+    assert np.array_equal(clearance(world, xy), clearance(lit_world, xy))
+    poses, eye = np.column_stack([xy, np.zeros(len(xy))]), Eye(top=math.radians(89), bottom=math.radians(-89))
+    assert np.allclose(covered_within(world, eye, poses, 0.05), covered_within(lit_world, eye, poses, 0.05))
+    look = Eye(width=60, height=20, samples=1)
+    with ScanlineRenderer(world, look) as one, ScanlineRenderer(lit_world, look) as other:
+        (away, which), (as_far, same_one) = one.hits(poses), other.hits(poses)
+    assert np.array_equal(away, as_far)
+    assert np.array_equal(np.minimum(which, len(world.triangles)), np.minimum(same_one, len(world.triangles)))
+
+
+def test_what_is_set_on_a_lit_world_holds_when_it_changes():
+    world = dataclasses.replace(lit(World.generate("tiny", 3), LOW), sky_rgb=(1, 2, 3))
+    assert changed_world(world, Change.parse("removed amount=0.5")).sky_rgb == (1, 2, 3)
+    flying = Experiment(world=lit(World.generate("tiny", 3), LOW), altitude=0.5, cull_back_faces=True).open_world()
+    changed = changed_world(flying, Change.parse("removed amount=1"))
+    assert changed.ground_height(np.array([[1.0, 1.0]])) == pytest.approx(0.49)
+    assert (flying.double_sided, changed.double_sided) == (False, False)
+    assert flying.light == LOW
+    with pytest.raises(SettingError, match="under the ground"):
+        Experiment(world=lit(World.generate("tiny", 3), LOW), altitude=-0.5).open_world()
+
+
+def test_a_sun_at_the_horizon_lights_nothing():
+    world = World.generate("tiny", 3)
+    for elevation in (1e-310, 1e-5, 0.0):
+        assert lit(world, Light(elevation=elevation)).light.direct == 0
+    with pytest.raises(SettingError, match="light is of type"):
+        light_spec(3)
+    with pytest.raises(SettingError, match=r"lit\(world"):
+        world.changed("sun hours=4")
 
 
 @pytest.mark.parametrize("light", [LOW, Light(clouds=1.0), Light(elevation=math.radians(-3))])
@@ -262,10 +307,12 @@ def test_the_renderers_agree_in_a_lit_world(backend, light):
     assert np.abs(views.mean(axis=(0, 1, 2)) - exact.mean(axis=(0, 1, 2))).max() < 0.5
 
 
-def test_lit_worlds_read_back_equal(tmp_path):
+@pytest.mark.parametrize("suffix", ["glb", "ply"])
+def test_lit_worlds_read_back_equal(tmp_path, suffix):
     world = lit(World.generate("tiny", 2), LOW)
-    write_world(world, tmp_path / "lit.glb")
-    back = read_world(tmp_path / "lit.glb")
+    write_world(world, tmp_path / f"lit.{suffix}")
+    back = read_world(tmp_path / f"lit.{suffix}")
+    assert pictures(back) == pictures(world)
     assert back.light == LOW
     assert np.array_equal(back.triangles, world.triangles)
     eye = Eye(width=60, height=20)
@@ -277,10 +324,14 @@ def test_textured_meshes_and_ground_of_others_are_lit():
     texture = Texture(rgba=np.full((2, 2, 4), 255, np.uint8))
     world = textured_world([texture], n=30)
     bright = lit(world, LOW)
-    assert bright.texturing.colours[:, 0, :3].max(axis=1).min() < 250  # something is in the shade
+    assert bright.texturing.colours[:, 0, :3].max(axis=1).min() < 250
     assert len(bright.texturing.index) == len(bright.triangles)
     valley = mesh_world(hills())
     assert lit(valley, LOW).ground is None
+    under = mesh_world(hills(), np.array([[(0, 0, 2), (6, 0, 2), (6, 6, 2)], [(0, 0, 2), (6, 6, 2), (0, 6, 2)]]))
+    n = len(hills())
+    high = Light(azimuth=0.3, elevation=1.4)
+    assert lit(under, high).rgb[n // 2].max() < 0.7 * lit(valley, high).rgb[n // 2].max()  # a roof throws a shadow
     assert len(np.unique(lit(valley, LOW).rgb[:, 0])) > 20  # slopes differ in the light; all had one colour
 
 
@@ -293,7 +344,7 @@ def test_a_walk_learns_and_arrives_in_the_light():
 # The compass in the sky
 
 
-@pytest.mark.parametrize("elevation", [2, 25, 50, 70])
+@pytest.mark.parametrize("elevation", [2, 25, 50, 70, 85])
 def test_a_level_dorsal_rim_reads_its_heading(elevation):
     light, rim = Light(azimuth=0.7, elevation=math.radians(elevation)), DorsalRim(unit_noise=0.0)
     for heading in np.linspace(-3, 3, 9).tolist():
@@ -350,7 +401,7 @@ def test_a_changed_world_is_lit_after_it_has_changed():
     )
     assert later.light == expected.light
     assert np.array_equal(later.rgb, expected.rgb)
-    assert later.texturing.to_bytes() == expected.texturing.to_bytes()
+    assert pictures(later) == pictures(expected)
     assert changed_world(morning, Change.parse("sun amount=0 | clouds amount=0")) is morning
     assert changed_world(plain, Change.parse("removed amount=0")) is plain
 

@@ -6,6 +6,7 @@ from jaxtyping import Float
 from .errors import SettingError
 from .generate import seeded
 from .geometry import Bounds
+from .plant_groups import no_plants
 from .plant_parts import Plant, coloured, joined
 from .scene import Ground, World
 
@@ -67,6 +68,7 @@ def arena(
     reach = radius + THICKNESS + FLOOR_MARGIN
     return World(
         **joined(pieces)._asdict(),
+        plants=no_plants(sum(len(piece.rgb) for piece in pieces)),
         ground=Ground(FLOOR_RGB, Bounds(-reach, -reach, reach, reach)),
         sky_rgb=LAMP_RGB,
         field=Bounds(-half, -half, half, half),

@@ -30,6 +30,7 @@ from .specs import Spec
 TRANSMITTANCE = 0.7  # tau, on a clear day
 UNDER_CLOUDS = 0.3  # diffuse light under clouds, as a share of all light of a clear day
 MIN_DIFFUSE = 1e-3  # at twilight
+GRAZING = math.radians(0.01)  # over the horizon; from lower the sun lights nothing
 TWILIGHT = math.radians(-6.0)  # civil; below it is night
 PRESSURE = 1010.0  # hPa; the atmosphere lifts the sun by half a degree at the horizon
 REFRACTED = math.radians(-0.575)  # no light of the sun comes around the earth from below this
@@ -64,7 +65,7 @@ class Light:
     @property
     def direct(self) -> float:
         """D: light from the sun on a surface that faces it, as a share of that outside the atmosphere."""
-        if self.elevation <= 0:
+        if self.elevation <= GRAZING:
             return 0.0
         return (1 - self.clouds) * TRANSMITTANCE ** air_mass(self.elevation)
 
@@ -98,7 +99,7 @@ class Light:
         elevation = math.asin(max(-1.0, min(1.0, z)))
         if elevation < TWILIGHT:
             raise SettingError(
-                f"{hours:g} hours later the sun is {math.degrees(elevation):.0f} degrees over the horizon: it is night; "
+                f"{hours:g} hours later the sun is {-math.degrees(elevation):.0f} degrees below the horizon: it is night; "
                 "give fewer hours, or another sun"
             )
         return Light(azimuth=math.atan2(y, x), elevation=elevation, clouds=self.clouds, latitude=self.latitude)
@@ -176,7 +177,7 @@ def daylight(latitude: float, longitude: float, time: str, clouds: float = 0.0) 
     Args:
         latitude: Of the place (rad, north positive).
         longitude: Of the place (rad, east positive).
-        time: As ISO 8601 says, such as 2026-06-21T10:30 (universal time) or 2026-06-21T10:30+02:00.
+        time: In ISO 8601, such as 2026-06-21T10:30 (universal time) or 2026-06-21T10:30+02:00.
         clouds: See `Light`.
 
     Raises:
@@ -204,7 +205,7 @@ def daylight(latitude: float, longitude: float, time: str, clouds: float = 0.0) 
         sun = ephem.Sun(place)
     if sun.alt < TWILIGHT:
         raise SettingError(
-            f"at {time} the sun is {math.degrees(sun.alt):.0f} degrees over the horizon there: it is night; give another time"
+            f"at {time} the sun is {-math.degrees(sun.alt):.0f} degrees below the horizon there: it is night; give another time"
         )
     return Light(azimuth=math.pi / 2 - float(sun.az), elevation=float(sun.alt), clouds=clouds, latitude=latitude)
 
@@ -221,6 +222,10 @@ def light_spec(value: Any) -> Spec | None:
     """The spec of a light from a text, a spec or a `Light`. None is the light in a world's own colours. Raises SettingError."""
     if value is None or isinstance(value, Spec):
         return value
+    if not isinstance(value, str | Light):
+        raise SettingError(
+            f"the light is of type {type(value).__name__}; give a Light, or a text such as 'sun azimuth_deg=90'"
+        )
     spec = LIGHTS.spec(value) if isinstance(value, str) else LIGHTS.spec_of(value)
     if not isinstance(spec.make(), Light):  # refuses bad parameters, too
         raise SettingError(f"{str(spec)!r} is not a light; name one, such as 'sun azimuth_deg=90 elevation_deg=30'")

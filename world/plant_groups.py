@@ -76,3 +76,10 @@ class GroupsBuilder:
             kind=np.array([number[name] for name in self.kinds], dtype=np.uint8),
             foot=foot.astype(np.float32),
         )
+
+
+def no_plants(count: int) -> PlantGroups:
+    """The groups of triangles of which none is of a plant."""
+    groups = GroupsBuilder()
+    groups.add_none(count)
+    return groups.build()

@@ -14,6 +14,7 @@ from .errors import SettingError
 from .flight import Flight
 from .generate import GENERATOR, generate_plants, generate_relief
 from .geometry import Bounds
+from .ground import QUAD_UV, Ground, check_bounds, check_colour
 from .light import Light
 from .params import WORLDS, WorldParams, preset_of
 from .plant_groups import PlantGroups
@@ -26,37 +27,6 @@ if TYPE_CHECKING:
     from .geometry import Route
 
 Made = TypeVar("Made")
-
-
-def check_colour(label: str, value: Any) -> None:
-    """Refuse an invalid colour. Raises SettingError."""
-    numbers = isinstance(value, tuple) and len(value) == 3 and all(isinstance(c, int) and 0 <= c <= 255 for c in value)
-    if not numbers:
-        raise SettingError(f"{label} is {value!r}; give three whole numbers from 0 to 255")
-
-
-def check_bounds(label: str, bounds: Bounds) -> None:
-    """Refuse what is not a rectangle within MAX_COORDINATE. Raises SettingError."""
-    numbers = all(isinstance(b, int | float) and not isinstance(b, bool) and abs(b) <= MAX_COORDINATE for b in bounds)
-    if not (numbers and bounds[0] <= bounds[2] and bounds[1] <= bounds[3]):
-        raise SettingError(f"{label} is {tuple(bounds)!r}; give x and y of its lower left and upper right corner (m)")
-
-
-@dataclass(frozen=True)
-class Ground:
-    """A flat rectangle at z = 0.
-
-    Attributes:
-        rgb: Its colour.
-        bounds: Where it is (m).
-    """
-
-    rgb: RGB
-    bounds: Bounds
-
-    def __post_init__(self):
-        check_colour("the colour of the ground", self.rgb)
-        check_bounds("the ground", self.bounds)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -195,7 +165,13 @@ class World:
         """
         from .change import Change
 
-        return (Change.parse(change) if isinstance(change, str) else change).apply(self, seed, route)
+        change = Change.parse(change) if isinstance(change, str) else change
+        if change.of_light:
+            raise SettingError(
+                f"{str(change)!r} changes the light, which is put on a world after its shapes have changed: "
+                "lit(world.changed('removed amount=0.2'), light.later(4.0))"
+            )
+        return change.apply(self, seed, route)
 
     def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Height of what agents stand or fly on at positions (both m): 0, or that of the terrain; nan where it has no ground."""
@@ -206,14 +182,27 @@ class World:
         return ~np.isnan(self.ground_height(xy))
 
     def surfaces(self) -> tuple[Float32[np.ndarray, "m 3 3"], UInt8[np.ndarray, "m 3"]]:
-        """Triangles and colours, with the two triangles of the ground (facing up) at the end: what a renderer draws."""
+        """Triangles and colours, with the triangles of the ground (facing up) at the end: what a renderer draws."""
         if self.ground is None:
             return self.triangles, self.rgb
-        x0, y0, x1, y1 = self.ground.bounds
-        a, b, c, d = (x0, y0, 0), (x1, y0, 0), (x1, y1, 0), (x0, y1, 0)
-        triangles = np.array([(a, b, c), (a, c, d)], dtype=np.float32)
-        rgb = np.array([self.ground.rgb] * 2, dtype=np.uint8)
-        return np.concatenate([self.triangles, triangles]), np.concatenate([self.rgb, rgb])
+        own = self.ground.triangles(), self.ground.colours()
+        return np.concatenate([self.triangles, own[0]]), np.concatenate([self.rgb, own[1]])
+
+    def surface_texturing(self) -> Texturing | None:
+        """The textures of all that `surfaces` has; None where there are none. A ground without parts has no texture."""
+        parts = () if self.ground is None else self.ground.parts
+        if not parts:
+            return self.texturing
+        n, k = len(self.triangles), 2 * len(parts)
+        own = self.texturing or Texturing(
+            textures=(), index=np.full(n, -1, np.int32), uv=np.zeros((n, 3, 2), np.float32)
+        )
+        return Texturing(
+            textures=own.textures + tuple(part.texture for part in parts),
+            index=np.concatenate([own.index, len(own.textures) + np.arange(k, dtype=np.int32) // 2]).astype(np.int32),
+            uv=np.concatenate([own.uv, np.tile(QUAD_UV, (len(parts), 1, 1))]),
+            colours=None if own.colours is None else np.concatenate([own.colours, np.full((k, 3, 4), 255, np.uint8)]),
+        )
 
 
 def once_per_world(make: Callable[[World], Made]) -> Callable[[World], Made]:

@@ -1,24 +1,28 @@
 """What a mesh cannot hold of a world, as JSON in its file: ground, sky, field, and how the world was made.
 
-A world that stands on its own triangles has version 3, which older versions of tussock refuse: they would let agents stand at z = 0.
+A world that stands on its own triangles, or is lit, has version 3, which older versions of tussock refuse: they would let agents stand at
+z = 0, and draw a sky of one colour.
 """
 
 import base64
+import io
 import zlib
 from typing import Any
 
 import attrs
 import numpy as np
+from PIL import Image
 
 from .errors import FileError
 from .geometry import Bounds
+from .ground import Ground, GroundPart, shadow_picture
 from .light import Light
 from .plant_groups import PlantGroups
-from .scene import Ground, World
+from .scene import World
 from .terrain import Part, Terrain
 
 KEY = "tussock"  # of the data in a file that a mesh cannot hold
-VERSION = 3  # 1: GLB files have z up; 2: y up, as the standard of glTF says; 3: with a terrain
+VERSION = 3  # 1: GLB files have z up; 2: y up, as the standard of glTF says; 3: with a terrain or a light
 DEFAULT_SKY = (191, 191, 191)
 
 
@@ -26,8 +30,8 @@ def to_json(world: World) -> dict[str, Any]:
     """What a mesh cannot hold, as JSON."""
     terrain = world.terrain if isinstance(world.terrain, Terrain) and world.terrain.part is not None else None
     data = {
-        "version": 2 if terrain is None else VERSION,
-        "ground": world.ground and {"rgb": list(world.ground.rgb), "bounds": list(world.ground.bounds)},
+        "version": 2 if terrain is None and world.light is None else VERSION,
+        "ground": world.ground and _ground_to_json(world.ground),
         "sky_rgb": list(world.sky_rgb),
         "field": list(world.field),
         "double_sided": world.double_sided,
@@ -38,6 +42,38 @@ def to_json(world: World) -> dict[str, Any]:
         return data
     first, stop = terrain.part
     return data | {"terrain": {"triangles": [first, stop, len(world.triangles)], "max_slope": terrain.max_slope}}
+
+
+def _ground_to_json(ground: Ground) -> dict[str, Any]:
+    """A ground, with the pictures of its parts as PNG."""
+    data: dict[str, Any] = {"rgb": list(ground.rgb), "bounds": list(ground.bounds)}
+    if ground.parts:
+        data["parts"] = [
+            {"bounds": list(part.bounds), "png": base64.b64encode(_png(part.texture.rgba)).decode("ascii")}
+            for part in ground.parts
+        ]
+    return data
+
+
+def _ground_of(data: dict[str, Any]) -> Ground:
+    """The ground that `_ground_to_json` saved."""
+    parts = [
+        GroundPart(Bounds(*part["bounds"]), shadow_picture(_rgba(base64.b64decode(part["png"]))))
+        for part in data.get("parts", [])
+    ]
+    return Ground(tuple(data["rgb"]), Bounds(*data["bounds"]), tuple(parts))
+
+
+def _png(rgba: np.ndarray) -> bytes:
+    """A picture as PNG."""
+    stream = io.BytesIO()
+    Image.fromarray(rgba).save(stream, format="png")
+    return stream.getvalue()
+
+
+def _rgba(data: bytes) -> np.ndarray:
+    """The picture in a PNG."""
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"))
 
 
 def standing(world: World, data: dict[str, Any]) -> World:
@@ -86,7 +122,7 @@ def from_json(data: dict[str, Any]) -> dict[str, Any]:
         raise FileError(f"written by a newer version ({data['version']})")
     ground = data["ground"]
     return {
-        "ground": None if ground is None else Ground(tuple(ground["rgb"]), Bounds(*ground["bounds"])),
+        "ground": None if ground is None else _ground_of(ground),
         "sky_rgb": tuple(data["sky_rgb"]),
         "field": Bounds(*data["field"]),
         "double_sided": data["double_sided"],

@@ -166,7 +166,22 @@ class Benchmark:
             for metres in (world.triangles, route.xy):
                 digest.update(np.round(metres.astype(np.float64) * 1e4).astype(np.int64).tobytes())
             digest.update(world.rgb.tobytes())
+        self._digest_changes(digest)
         return digest.hexdigest()
+
+    def _digest_changes(self, digest: Any) -> None:
+        """Add the first world of each condition after its change."""
+        for _, runs in groupby(
+            zip(self.asked(), self.sweep().experiments, strict=True), key=lambda run: run[0].condition
+        ):
+            _, first = next(runs)
+            if first.test_change is None:
+                continue
+            world, route = first.replace(light=None).open_world_and_route()
+            changed = first.test_change.apply(world, first.seed, route)
+            digest.update(np.round(changed.triangles.astype(np.float64) * 1e4).astype(np.int64).tobytes())
+            if first.light is not None:
+                digest.update(repr(first.test_change.lit(first.light.make())).encode())
 
 
 def _worlds(count: int) -> tuple[tuple[str, int], ...]:

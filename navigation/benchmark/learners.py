@@ -43,6 +43,7 @@ def tasks(benchmark: Benchmark = BENCHMARK, encoding: str | None = ENCODING) -> 
         benchmark: What is asked.
         encoding: What the learner gets of a view; None is the panorama itself.
     """
+    _check_has_no_conditions(benchmark)
     for runs in benchmark.by_world(encoding or ENCODING):
         yield from _tasks_of(runs, encoded=encoding is not None)
 
@@ -75,10 +76,7 @@ def enter_learner(
     """
     progress = printed(progress, "walking", "runs")
     results: list[dict[str, Any]] = []
-    if benchmark.conditions:
-        raise SettingError(
-            f"{benchmark.name} changes worlds after learning, and the Gymnasium task does not; enter {BENCHMARK.name}"
-        )
+    _check_has_no_conditions(benchmark)
     chain = PANORAMA if encoding is None else benchmark.chain(encoding)
     check_free(out, benchmark, name, chain)
     for runs in benchmark.by_world(encoding or ENCODING):
@@ -115,6 +113,14 @@ def walk(env: RouteFollowing, task: Task, act: Act) -> dict[str, Any]:
         "mean_deviation_m": float(np.mean(deviation)),
         "max_deviation_m": max(deviation),
     }
+
+
+def _check_has_no_conditions(benchmark: Benchmark) -> None:
+    """Refuse a benchmark that the Gymnasium task cannot do. Raises SettingError."""
+    if benchmark.conditions:
+        raise SettingError(
+            f"{benchmark.name} changes worlds after learning, and the Gymnasium task does not; enter {BENCHMARK.name}"
+        )
 
 
 def _tasks_of(runs: list[Experiment], *, encoded: bool) -> list[Task]:
