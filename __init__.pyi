@@ -36,6 +36,7 @@ from .navigation import draw_world as draw_world
 from .navigation import grid_positions as grid_positions
 from .navigation import heading_errors as heading_errors
 from .navigation import heading_field as heading_field
+from .navigation import hemifields as hemifields
 from .navigation import landscape as landscape
 from .navigation import load_model as load_model
 from .navigation import make_model as make_model

@@ -24,6 +24,7 @@ from .models import PerfectMemory as PerfectMemory
 from .models import RandomHeadings as RandomHeadings
 from .models import SpikingMushroomBody as SpikingMushroomBody
 from .models import VisualCompass as VisualCompass
+from .models import hemifields as hemifields
 from .models import make_model as make_model
 from .models import opponent as opponent
 from .models.base import FamiliarityModel as FamiliarityModel

@@ -33,13 +33,13 @@ def as_model(value: Any) -> Any:
         return value
     from .models import MODELS, model_spec
     from .models.base import Model
-    from .models.opponents import Opponent
+    from .models.two_memories import TwoMemories
 
     if isinstance(value, Model) and (value.shape is not None or value.seed or value.device != "cpu"):
         raise SettingError(
             f"{value!r} has learned, or has a seed or device; give an untrained model, and seed and device to the experiment"
         )
-    return model_spec(str(value)) if isinstance(value, str | Opponent) else MODELS.spec_of(value)
+    return model_spec(str(value)) if isinstance(value, str | TwoMemories) else MODELS.spec_of(value)
 
 
 def as_navigator(value: Any) -> Any:

@@ -18,7 +18,7 @@ from tussock.navigation.models import MODELS
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.render import Eye
 
-NAMES = [*MODELS.builtin, "opponent-perfect-memory", "opponent-mlp"]
+NAMES = [*MODELS.builtin, "opponent-perfect-memory", "opponent-mlp", "hemifields-infomax"]
 H, W = 3, 8
 
 

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from tussock.navigation.models import OPPONENT, make_model
+from tussock.navigation.models import make_model
+from tussock.navigation.models.registry import split_prefix
 
 SMALL = {
     "mlp": {"hidden_layer_sizes": (8,), "max_iter": 10},
@@ -27,4 +28,4 @@ SMALL = {
 
 def small(name: str, **parameters: Any) -> Any:
     """An untrained model, small unless the parameters say otherwise."""
-    return make_model(name, **(SMALL.get(name.removeprefix(OPPONENT), {}) | parameters))
+    return make_model(name, **(SMALL.get(split_prefix(name)[1], {}) | parameters))

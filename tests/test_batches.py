@@ -9,10 +9,10 @@ from small_models import small
 
 from tussock.navigation.encoding import PRESETS, Encoding
 from tussock.navigation.feature_mask import FeatureMask
-from tussock.navigation.models import MODELS, OPPONENT
+from tussock.navigation.models import HEMIFIELDS, MODELS, OPPONENT
 from tussock.navigation.threads import threads
 
-NAMES = [*MODELS.builtin, OPPONENT + "infomax"]
+NAMES = [*MODELS.builtin, OPPONENT + "infomax", HEMIFIELDS + "infomax"]
 PARAMETERS = {"infomax": {"units": 150}}
 
 

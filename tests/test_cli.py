@@ -83,6 +83,7 @@ def test_no_command_shows_them_all_and_a_wrong_one_is_one_line(capfd):
         ["--help"],
         ["run", "--help"],
         ["run", "--model", "opponent-perfect-memori"],
+        ["run", "--model", "hemifields-perfect-memori"],
         ["evaluate", "--model", "infomx width=3"],
         ["run", "--navigator", "laterl(k=1)"],
     ],
@@ -403,7 +404,7 @@ def test_compare_refuses_a_start_outside_the_world_before_it_trains(capfd, monke
 
 def test_models_lists_each_with_a_line_and_its_paper(capfd):
     models = printed(capfd, "models")["models"]
-    assert [*MODELS.names, "opponent-..."] == list(models)
+    assert [*MODELS.names, "opponent-...", "hemifields-..."] == list(models)
     assert all(set(row) == {"what", "paper"} for row in models.values())
     assert all(len(models[name]["what"]) > 20 and models[name]["paper"] for name in MODELS.builtin)
     assert "Ardin" in tussock(capfd, "models")[1]
@@ -478,6 +479,11 @@ BAD = {
     "a model file of zeros": (
         ["run", *SMALL, "--model", "odd.safetensors", "--out", "r"],
         ["odd.safetensors", "tussock train"],
+    ),
+    "hemifields of nothing": (["evaluate", *SMALL, "--model", "hemifields-chian"], ["'chian'", "did you mean 'chain'"]),
+    "hemifields of one side": (
+        ["evaluate", *SMALL, "--model", "hemifields-chain", "--side", "left"],
+        ["nothing to the right of straight ahead"],
     ),
     "an opponent of nothing": (["evaluate", *SMALL, "--model", "opponent-oracle"], ["'oracle'"]),
     "an unknown suffix of a model": (["train", *SMALL, "--out", "m.pt"], ["m.pt", ".safetensors"]),

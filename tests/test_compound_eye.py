@@ -147,7 +147,7 @@ def test_every_model_scans_as_if_it_looked_at_each_turn(name, normalised):
     encoded = Encoding.parse(text).for_eye(eye)
     rng = np.random.default_rng(7)
     learned, others = (rng.integers(0, 256, (n, 12, 24, 4), dtype=np.uint8) for n in (12, 2))
-    bodies = ("mushroom-body", "opponent-mushroom-body")
+    bodies = ("mushroom-body", "opponent-mushroom-body", "hemifields-mushroom-body")
     model = small(name, **({"smoothing_deg": 0.0, "overlap_deg": 8.0} if name in bodies else {}))
     model.see(encoded.mask).fit(encoded(learned))
     scans = model.scan(encoded(others)).numpy()

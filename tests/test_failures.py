@@ -250,8 +250,18 @@ def test_a_control_that_recognises_nothing_fails_by_chance():
     assert {(each.cause, each.recognised) for each in poor} == {(Cause.UNEXPLAINED, None)}
     assert all("off the route's" in str(each) for each in poor)
     assert any(each.nearest > CATCHMENT for each in poor)
-    told = {name: recognises(make_model(name)) for name in ("random", "opponent-random", "infomax", "opponent-chain")}
-    assert told == {"random": False, "opponent-random": False, "infomax": True, "opponent-chain": True}
+    told = {
+        name: recognises(make_model(name))
+        for name in ("random", "opponent-random", "hemifields-random", "infomax", "opponent-chain", "hemifields-chain")
+    }
+    assert told == {
+        "random": False,
+        "opponent-random": False,
+        "hemifields-random": False,
+        "infomax": True,
+        "opponent-chain": True,
+        "hemifields-chain": True,
+    }
     assert recognises(WithoutMatch())
 
 

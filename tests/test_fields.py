@@ -19,7 +19,7 @@ from tussock.navigation.encoding import PRESETS, Encoding
 from tussock.navigation.encoding_steps import EncodingStep
 from tussock.navigation.experiment import Experiment
 from tussock.navigation.feature_mask import FeatureMask
-from tussock.navigation.models import MODELS, OPPONENT, PerfectMemory, make_model
+from tussock.navigation.models import HEMIFIELDS, MODELS, OPPONENT, PerfectMemory, make_model
 from tussock.navigation.models.base import Model
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.models.mushroom_body import receptive_fields
@@ -34,7 +34,14 @@ from tussock.render.renderer import open_renderer
 from tussock.world.errors import FileError, SettingError
 from tussock.world.geometry import Pose
 
-NAMES = [*MODELS.builtin, *(OPPONENT + name for name in ("perfect-memory", "mlp", "mushroom-body", "random"))]
+NAMES = [
+    *MODELS.builtin,
+    *(
+        prefix + name
+        for prefix in (OPPONENT, HEMIFIELDS)
+        for name in ("perfect-memory", "mlp", "mushroom-body", "random")
+    ),
+]
 TURNING = {
     "mlp",
     "mlp-rotation",
@@ -90,7 +97,7 @@ def hidden_at(view: np.ndarray, visible: np.ndarray, normalised: bool, gain: flo
 @cache
 def trained(name: str, kind: str, normalised: bool) -> Model:
     parameters = (
-        {"smoothing_deg": 0.0, "overlap_deg": 8.0} if name in ("mushroom-body", OPPONENT + "mushroom-body") else {}
+        {"smoothing_deg": 0.0, "overlap_deg": 8.0} if name.endswith("mushroom-body") and "spiking" not in name else {}
     )
     return small(name, **parameters).see(mask_of(kind, normalised)).fit(0.3 + views(12))
 
@@ -101,6 +108,8 @@ def queries() -> torch.Tensor:
 
 def by_brute_force(model: Model, view: np.ndarray, mask: FeatureMask) -> np.ndarray:
     """Familiarity of a view at every rotation: of each image with its hidden pixels 0 alone."""
+    if hasattr(model, "left"):
+        return by_brute_force(model.left, view, model.left.mask) + by_brute_force(model.right, view, model.right.mask)
     if hasattr(model, "attractive"):
         return by_brute_force(model.attractive, view, mask) - by_brute_force(model.repulsive, view, mask)
     visible = mask.visible.numpy()
@@ -186,7 +195,9 @@ def test_what_is_hidden_at_a_rotation_makes_no_difference_there(name, kind, norm
         assert name == "opponent-random" or not torch.allclose(there, scan, rtol=1e-3, atol=1e-3)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in TURNING and not name.startswith(OPPONENT)])
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if name not in TURNING and not name.startswith((OPPONENT, HEMIFIELDS))]
+)
 def test_what_is_hidden_while_learning_is_not_learned(name):
     hidden = torch.from_numpy(~visible_of("180"))
     learned = torch.where(hidden, 9 * views(12, 8), 0.3 + views(12))

@@ -25,7 +25,13 @@ from tussock.render.eye import Eye
 from tussock.world.errors import FileError, InputError, SettingError
 from tussock.world.settings import number
 
-NAMES = [*MODELS.builtin, "opponent-perfect-memory", "opponent-autoencoder"]
+NAMES = [
+    *MODELS.builtin,
+    "opponent-perfect-memory",
+    "opponent-autoencoder",
+    "hemifields-perfect-memory",
+    "hemifields-rbm",
+]
 
 
 @cache
@@ -90,7 +96,7 @@ def test_parameters_are_read_back_with_their_types(tmp_path):
 
 
 def test_a_loaded_model_can_learn_further_views(tmp_path):
-    for name in ("perfect-memory", "infomax", "mushroom-body"):
+    for name in ("perfect-memory", "infomax", "mushroom-body", "hemifields-infomax"):
         model = small(name).fit(views(4))
         save(model, tmp_path / name)
         loaded = load_model(tmp_path / name).model.partial_fit(views(3, 1))
@@ -112,7 +118,7 @@ def test_the_same_model_gives_the_same_bytes(name, tmp_path):
 
 def test_another_model_than_expected_is_refused_naming_both(saved):
     assert load_model(saved, expect="infomax").model.name == "infomax"
-    for expected in ("mushroom-body", "opponent-infomax"):
+    for expected in ("mushroom-body", "opponent-infomax", "hemifields-infomax"):
         message = refuses(saved, expect=expected)
         assert "'infomax'" in message
         assert repr(expected) in message
@@ -192,6 +198,10 @@ def test_a_header_of_another_kind_is_refused(saved, header, expect):
     [
         ("model", "infomix"),
         ("model", "opponent-infomix"),
+        ("model", "opponent-infomax"),  # which learns two of them
+        ("model", "hemifields-infomax"),
+        ("model", "hemifields-infomix"),
+        ("model", "hemifields-opponent-infomax"),
         ("model", "rbm"),  # which learns other tensors
         ("model", 7),
         ("model", None),

@@ -11,14 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scenes import views
 
-from tussock.navigation.models import MODELS, OPPONENT, make_model, model_spec
+from tussock.navigation.models import HEMIFIELDS, MODELS, OPPONENT, make_model, model_spec
 from tussock.navigation.models.base import Model
 from tussock.navigation.models.infomax import RATES
+from tussock.navigation.models.registry import split_prefix
 from tussock.world.errors import SettingError
 from tussock.world.specs import split_list
 
 TUSSOCK = Path(sys.executable).with_name("tussock")
 NAMES = list(MODELS.builtin)
+TWO_MEMORIES = (OPPONENT, HEMIFIELDS)  # prefixes of names
 
 
 @st.composite
@@ -59,16 +61,18 @@ def test_the_spec_of_a_model_makes_the_same_model(name, data):
     assert again.parameters == model.parameters | {"seed": 7}
     assert type(again) is type(model)
     assert str(again) == str(model_spec(text)) == text
-    opponents = make_model(OPPONENT + text)
-    assert opponents.parameters == model.parameters
-    assert str(opponents) == str(model_spec(OPPONENT + text)) == OPPONENT + text
-    assert split_list(f"chain, {text} ,{OPPONENT}{text}") == ["chain", text, OPPONENT + text]
+    for prefix in TWO_MEMORIES:
+        both = make_model(prefix + text)
+        assert both.parameters == model.parameters
+        assert str(both) == str(model_spec(prefix + text)) == prefix + text
+        assert split_list(f"chain, {text} ,{prefix}{text}") == ["chain", text, prefix + text]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_spec_of_defaults_is_the_name(name):
     assert str(make_model(name, seed=3)) == name
-    assert str(make_model(OPPONENT + name)) == OPPONENT + name
+    for prefix in TWO_MEMORIES:
+        assert str(make_model(prefix + name)) == prefix + name
 
 
 @pytest.mark.parametrize(
@@ -86,7 +90,7 @@ def test_the_spec_of_defaults_is_the_name(name):
     ],
 )
 def test_a_spec_sets_parameters(text, parameters):
-    for prefix in ("", OPPONENT):
+    for prefix in ("", *TWO_MEMORIES):
         model = make_model(prefix + text.strip(), device="cpu", seed=5)
         name = text.split()[0]
         assert model.name == prefix + name
@@ -97,7 +101,7 @@ FORMER = [(name, former, present) for name in NAMES for former, present in MODEL
 
 
 @pytest.mark.parametrize(("name", "former", "present"), FORMER)
-@pytest.mark.parametrize("prefix", ["", OPPONENT])
+@pytest.mark.parametrize("prefix", ["", *TWO_MEMORIES])
 def test_former_names_of_parameters_are_understood_and_present_ones_printed(prefix, name, former, present):
     name = prefix + name
     text = f"{name} {former}=7"
@@ -127,7 +131,20 @@ def test_a_model_of_a_spec_learns_as_the_same_made_with_keywords():
 
 
 @pytest.mark.parametrize(
-    "name", ["perfect-memry", "", "Perfect-Memory", "opponent-", "opponent-perfect-memry", "opponent"]
+    "name",
+    [
+        "perfect-memry",
+        "",
+        "Perfect-Memory",
+        "opponent-",
+        "opponent-perfect-memry",
+        "opponent",
+        "hemifields-",
+        "hemifields-perfect-memry",
+        "hemifields",
+        "hemifields-opponent-perfect-memory",
+        "opponent-hemifields-perfect-memory",
+    ],
 )
 def test_an_unknown_model_is_refused_with_the_known_ones(name):
     for make in (make_model, model_spec):
@@ -140,6 +157,8 @@ REFUSED = {
     "mushroom-body colour=red": ["no parameter 'colour'", "columns, rows, cells, inputs"],
     "perfect-memory window=1": ["no parameter 'window'", "none"],
     "opponent-infomax name=x": ["no parameter 'name'"],
+    "hemifields-infomax name=x": ["no parameter 'name'"],
+    "hemifields-mushroom-body inputs=361": ["361"],
     "oracle cells=3": ["'oracle'", "known:"],
     "infomax seed=3": ["--seed"],
     "rbm device=cuda": ["--device"],
@@ -172,7 +191,7 @@ def test_an_invalid_spec_is_refused_in_one_line(text):
         make_model(text)
     message = str(refusal.value)
     assert "\n" not in message
-    assert text.split()[0].removeprefix(OPPONENT) in message
+    assert split_prefix(text.split()[0])[1] in message
     for part in REFUSED[text]:
         assert part in message
 

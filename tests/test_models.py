@@ -1,4 +1,4 @@
-"""One conformance suite for all familiarity models, and for opponent memories of some of them."""
+"""One conformance suite for all familiarity models, and for two memories, opponent or of both hemifields, of some of them."""
 
 import copy
 from functools import cache
@@ -11,10 +11,11 @@ from scenes import views
 from small_models import small
 
 from tussock.navigation.feature_mask import FeatureMask
-from tussock.navigation.models import MODELS, OPPONENT, make_model
+from tussock.navigation.models import HEMIFIELDS, MODELS, OPPONENT, make_model
 from tussock.navigation.models.base import FamiliarityModel, Model, memory_bytes, score
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.models.incremental import IncrementalModel
+from tussock.navigation.models.registry import split_prefix
 from tussock.navigation.scan import scan_window
 from tussock.navigation.steering.navigator import Look
 from tussock.navigation.steering.scan import Scan
@@ -24,9 +25,13 @@ from tussock.world.geometry import turn_of_columns
 REFUSED = (InputError, TypeCheckError)  # with type checking on, as here, a wrong rank does not reach our own check
 
 BUILTIN = list(MODELS.builtin)
-# Opponent memories of a model that keeps views, one that learns view by view, an estimator and a control. That those of all
-# models are two models, one less the other, is a law in test_model_oracles.py.
-NAMES = [*BUILTIN, *(OPPONENT + name for name in ("perfect-memory", "infomax", "mlp", "random"))]
+# Two memories of a model that keeps views, one that learns view by view, an estimator and a control. That those of all
+# models are two models, one less the other or both together, is a law in test_model_oracles.py and test_hemifields.py.
+PREFIXES = ("", OPPONENT, HEMIFIELDS)
+NAMES = [
+    *BUILTIN,
+    *(prefix + name for prefix in PREFIXES[1:] for name in ("perfect-memory", "infomax", "mlp", "random")),
+]
 KEEPS_VIEWS = {"perfect-memory", "chain", "window-memory", "spike-overlap"}  # their memory grows with the route
 DRAWS_NOTHING = {"visual-compass", "perfect-memory", "chain", "window-memory"}
 INCREMENTAL = {
@@ -42,8 +47,8 @@ PARAMETERS = {"rbm": {"epochs": 500}, "spiking-mushroom-body": {"kenyon_weight":
 
 
 def base(name: str) -> str:
-    """The name without `opponent-`."""
-    return name.removeprefix(OPPONENT)
+    """The name without `opponent-` or `hemifields-`."""
+    return split_prefix(name)[1]
 
 
 @cache
@@ -83,7 +88,7 @@ def test_model_of_a_name_has_the_class_of_the_registry(name):
     assert isinstance(model, Model)
     assert model.name == name
     assert model.paper
-    assert type(getattr(model, "attractive", model)) is MODELS.find(base(name))
+    assert type(getattr(model, "first", model)) is MODELS.find(base(name))
     assert MODELS.name_of(MODELS.find(base(name))) == base(name)
 
 
@@ -91,6 +96,7 @@ def test_repr_names_the_class(name, trained):
     for model in (make_model(name), trained):
         assert MODELS.find(base(name)).__name__ in repr(model)
         assert ("Opponent" in repr(model)) == name.startswith(OPPONENT)
+        assert ("Hemifields" in repr(model)) == name.startswith(HEMIFIELDS)
 
 
 def test_scan_of_a_rolled_view_is_the_rolled_scan(name, trained):
@@ -499,7 +505,7 @@ BAD_PARAMETERS = [
 ]
 
 
-@pytest.mark.parametrize("prefix", ["", OPPONENT])
+@pytest.mark.parametrize("prefix", PREFIXES)
 @pytest.mark.parametrize(("name", "parameter", "value"), BAD_PARAMETERS, ids=str)
 def test_an_invalid_parameter_is_refused_when_the_model_is_made(prefix, name, parameter, value):
     with pytest.raises(SettingError) as refusal:
@@ -574,6 +580,8 @@ def test_public_names_are_loaded_when_they_are_used():
     from tussock.navigation import models
 
     make_model("opponent-perfect-memory")
+    make_model("hemifields-perfect-memory")
     assert callable(navigation.opponent)  # the function, not the module opponents
-    assert {"PerfectMemory", "MODELS", "make_model", "model_spec", "opponent"} <= set(dir(models))
+    assert callable(navigation.hemifields)
+    assert {"PerfectMemory", "MODELS", "make_model", "model_spec", "opponent", "hemifields"} <= set(dir(models))
     assert all(getattr(models, each) is not None for each in models.__all__)

@@ -19,7 +19,7 @@ from tussock.navigation.experiment import Experiment
 from tussock.navigation.feature_mask import FeatureMask
 from tussock.navigation.measures.image_difference import differences, differences_of_places, rotational, translational
 from tussock.navigation.measures.place_recognition import recognise
-from tussock.navigation.models import MODELS, OPPONENT, PerfectMemory, make_model
+from tussock.navigation.models import HEMIFIELDS, MODELS, OPPONENT, PerfectMemory, make_model
 from tussock.navigation.models.files import TrainedModel, load_model, save_model
 from tussock.navigation.overlap import MIN_OVERLAP, Overlap
 from tussock.navigation.tested_poses import poses_to_test, route_views_of
@@ -146,7 +146,7 @@ def test_a_model_recognises_the_nearest_of_what_it_can_compare(name, normalised,
 
 def test_models_that_need_whole_images_name_the_one_that_does_not():
     mask = FeatureMask(torch.ones(H, W, dtype=torch.bool), partial=True)
-    for name in [*MODELS.builtin, OPPONENT + "perfect-memory"]:
+    for name in [*MODELS.builtin, OPPONENT + "perfect-memory", HEMIFIELDS + "perfect-memory"]:
         if name in PARTIAL:
             make_model(name).see(mask)
             continue

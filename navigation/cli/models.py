@@ -218,7 +218,9 @@ class ModelsCommand(Command):
             name: {"what": first_paragraph(cls.__doc__), "paper": getattr(cls, "paper", "")}
             for name, cls in others.items()
         }
-        return {"models": told | {"opponent-...": described("tussock.navigation.models.opponents:Opponent")}}
+        told["opponent-..."] = described("tussock.navigation.models.opponents:Opponent")
+        told["hemifields-..."] = described("tussock.navigation.models.hemifield_memories:Hemifields")
+        return {"models": told}
 
 
 def described(where: str) -> dict[str, str]:

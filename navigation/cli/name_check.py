@@ -6,7 +6,7 @@ from typing import Any
 from tussock.world.change import check_names as check_change
 
 from ..experiment_fields import MODEL_SUFFIX
-from ..models.registry import MODELS, OPPONENT
+from ..models.registry import MODELS, split_prefix
 from ..steering.registry import NAVIGATORS
 from .options import ModelOptions
 
@@ -17,7 +17,7 @@ def check_names(command: Any) -> None:
         return
     model, navigator = (_first_word(getattr(command, name, "")) for name in ("model", "navigator"))
     if model and not model.endswith(MODEL_SUFFIX):
-        MODELS.check(model.removeprefix(OPPONENT))
+        MODELS.check(split_prefix(model)[1])
     if navigator:
         NAVIGATORS.check(navigator)
     if getattr(command, "test_change", None):

@@ -22,9 +22,9 @@ from ..devices import check_device, chosen_device
 from ..encoding import OLD_NAMES, STEPS, Encoding
 from ..feature_mask import FeatureMask
 from .base import FamiliarityModel, Model
-from .opponents import Opponent
-from .registry import MODELS, OPPONENT
+from .registry import MODELS, split_prefix
 from .specs import find_model, make_model, present_names
+from .two_memories import TwoMemories
 
 HEADER, VERSION = "tussock", 1
 VISIBLE = "mask.visible"  # the tensor of the mask of a model that does not see everything
@@ -210,15 +210,15 @@ def _trained(path: Path, header: dict[str, Any], tensors: dict[str, torch.Tensor
 
 def model_in_files(model: Model) -> str:
     """The name of a model's class in a file."""
-    if isinstance(model, Opponent):
-        return OPPONENT + model_in_files(model.attractive)
+    if isinstance(model, TwoMemories):
+        return model.prefix + model_in_files(model.first)
     return MODELS.name_in_files(type(model))
 
 
 def _check_known(path: Path, model: str, encoding: str | None) -> None:
     """Refuse a file that needs classes from outside that are not known in this process. Raises FileError."""
     steps = [] if encoding is None else [part.split()[0] for part in encoding.split("|")]
-    needed = [(MODELS, model.removeprefix(OPPONENT)), *((STEPS, OLD_NAMES.get(step, step)) for step in steps)]
+    needed = [(MODELS, split_prefix(model)[1]), *((STEPS, OLD_NAMES.get(step, step)) for step in steps)]
     for registry, name in needed:
         if name not in registry:
             raise FileError(

@@ -3,6 +3,7 @@
 from tussock.world.registry import Registry
 
 OPPONENT = "opponent-"  # before the name of a model: opponent memories of it
+HEMIFIELDS = "hemifields-"  # likewise: memories of both hemifields
 
 MODELS = Registry(
     "models",
@@ -28,3 +29,12 @@ MODELS = Registry(
         }.items()
     },
 )
+
+
+def split_prefix(name: str) -> tuple[str, str]:
+    """What stands before the name of a model (OPPONENT, HEMIFIELDS or nothing), and the name."""
+    if name not in MODELS:
+        for prefix in (OPPONENT, HEMIFIELDS):
+            if name.startswith(prefix):
+                return prefix, name.removeprefix(prefix)
+    return "", name

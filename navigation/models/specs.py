@@ -1,14 +1,19 @@
-"""Models by their specs: a name, perhaps with `opponent-` before it, and parameters."""
+"""Models by their specs: a name, perhaps with `opponent-` or `hemifields-` before it, and parameters."""
 
+import inspect
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from tussock.world.errors import SettingError
 from tussock.world.specs import Spec
 
 from .base import FamiliarityModel
-from .opponents import opponents_of
-from .registry import MODELS, OPPONENT
+from .hemifield_memories import hemifields
+from .opponents import opponent
+from .registry import HEMIFIELDS, MODELS, OPPONENT, split_prefix
+
+TWO_MEMORIES = {OPPONENT: opponent, HEMIFIELDS: hemifields}
 
 
 def make_model(text: str, **parameters: Any) -> Any:
@@ -16,7 +21,8 @@ def make_model(text: str, **parameters: Any) -> Any:
 
     Args:
         text: Its name, after which parameters may follow: "mushroom-body inputs=10 cells=20000". `opponent-` before the name gives
-            opponent memories. A class from outside is named by its entry point or as `package.module:Class`.
+            opponent memories, `hemifields-` memories of both hemifields. A class from outside is named by its entry point or as
+            `package.module:Class`.
         parameters: Further parameters of the class, and `seed` and `device`, which cannot be part of the text.
 
     Raises:
@@ -35,20 +41,33 @@ def model_spec(text: str) -> Spec:
 
 
 def find_model(name: str, *, importing: bool = True) -> Callable[..., FamiliarityModel]:
-    """The class of a model's name, or a function that makes its opponent memories.
+    """The class of a model's name, or a function that makes two memories of it.
 
     Args:
-        name: A name in MODELS, or `package.module:Class`, either with `opponent-` before it or not.
+        name: A name in MODELS, or `package.module:Class`, either with `opponent-` or `hemifields-` before it or not.
         importing: Whether `package.module:Class` may be imported.
 
     Raises:
         SettingError: For an unknown name, and for a class without `fit` and `scan`.
     """
-    opposed = name.startswith(OPPONENT) and name not in MODELS
-    cls = MODELS.find(name.removeprefix(OPPONENT) if opposed else name, importing=importing)
+    prefix, single = split_prefix(name)
+    cls = MODELS.find(single, importing=importing)
     if isinstance(cls, type) and not (hasattr(cls, "fit") and hasattr(cls, "scan")):
         raise SettingError(f"{name!r} is not a familiarity model: it lacks fit(views) or scan(views)")
-    return opponents_of(cls) if opposed else cls
+    return two_memories_of(cls, prefix) if prefix else cls
+
+
+@cache
+def two_memories_of(cls: Callable[..., FamiliarityModel], prefix: str) -> Callable[..., FamiliarityModel]:
+    """A function that makes two memories, with the parameters of a class of models."""
+
+    def make(**parameters: Any) -> FamiliarityModel:
+        return TWO_MEMORIES[prefix](cls(**parameters))
+
+    make.__signature__ = inspect.signature(cls)  # type: ignore[attr-defined]
+    make.__module__, make.__qualname__ = cls.__module__, f"{prefix}{getattr(cls, '__qualname__', '')}"
+    make.renamed = getattr(cls, "renamed", {})  # type: ignore[attr-defined]
+    return make
 
 
 def present_names(target: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, Any]:
