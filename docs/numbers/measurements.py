@@ -51,6 +51,25 @@ def measure_test_bed(folder: Path) -> Values:
     return {"arrived": {result.entry: result.scores()["totals"]["arrived_share"] for result in read_results(RESULTS)}}
 
 
+def measure_test_bed_3(folder: Path) -> Values:
+    """Two models on tussock-3, and perfect memory with other encodings; the results are in docs/benchmark/tussock-3."""
+    entries = [("perfect-memory", "grey"), ("perfect-memory", "uv"), ("perfect-memory,chain", "edges")]
+    for model, encoding in entries:
+        tussock(
+            folder, "benchmark", "--test-bed", "tussock-3", "--model", model, "--encoding", encoding, "--out", "bed"
+        )
+    for path in (folder / "bed" / "results").glob("*.json"):
+        (RESULTS_3 / path.name).write_bytes(path.read_bytes())
+    results = read_results(RESULTS_3)
+    seconds = sum(len(result.runs) * result.times["walk_seconds"] for result in results)
+    return {"seconds": seconds} | {
+        f"{result.entry}, {result.encoding}": {
+            name: score["arrived_share"] for name, score in result.scores()["by_condition"].items()
+        }
+        for result in results
+    }
+
+
 def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
     """The two cells of a line of the table of learning walks."""
     return {
@@ -59,6 +78,7 @@ def with_and_without(noise: str) -> dict[str, Callable[[Values], str]]:
     }
 
 
+RESULTS_3 = RESULTS / "tussock-3"
 NOT_ENTERED = {"window-memory", "spiking-mushroom-body", "spike-overlap"}  # in the test bed, so far
 MODELS = [name for name in REGISTRY.builtin if name not in NOT_ENTERED]
 MEASUREMENTS = (
@@ -93,6 +113,12 @@ MEASUREMENTS = (
                 for model in MODELS
             }
             | {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS))},
+            slow=True,
+        ),
+        "test-bed-3": Measurement(
+            "`tussock benchmark --test-bed tussock-3 --model perfect-memory,chain`; perfect memory with `--encoding grey` and `uv`, too",
+            measure_test_bed_3,
+            {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS_3))},
             slow=True,
         ),
     }
