@@ -1,13 +1,13 @@
 """A compass in the sky: the dorsal rim of an insect's eye, which sees how the light above is polarised.
 
-Units look up at points of a dome around the zenith of the body. Unit i, at the azimuth a_i of the body, compares light that swings
-along its ring of the dome with light that swings across it. What it reads is
+Units look up at points of a dome around the zenith of the body. Unit i, at the azimuth a_i of the body, compares light that is polarised
+along its ring of the dome with light that is polarised across it. What it reads is
 
     S_i = d_i cos 2 (chi_i - a_i - 90 degrees)
 
-for light of the degree of polarisation d_i that swings in the direction chi_i. Under a level body the light above swings at right
-angles to the plane through sun and zenith, so half the angle of the sum of S_i exp(2 i a_i) is the direction of that plane: the heading
-up to a half-turn. Which half is brighter tells the rest (Labhart 1988; Lambrinos et al. 1997; the dome is that of Gkanias et al. 2019).
+for light of the degree of polarisation d_i with the e-vector chi_i. Above a level body the e-vectors are at right angles to the plane
+through sun and zenith, so half the angle of the sum of S_i exp(2 i a_i) is the direction of that plane: the heading up to a half-turn.
+The brighter half of the sky decides between the two (Labhart 1988; Lambrinos et al. 1997; the dome is that of Gkanias et al. 2019).
 """
 
 from functools import cache
@@ -34,7 +34,7 @@ class DorsalRim(Senses):
         units: Their number, spread over the dome in rings.
         dome: Angle from one side of the dome to the other (rad).
         unit_noise: Standard deviation of what each unit reads (of -1 to 1), new at each reading.
-        sees_sun: Whether the brighter half of the sky tells the heading from its opposite. Otherwise a walk begins with either at
+        sees_sun: Whether the brighter half of the sky decides between a heading and its opposite. Otherwise a walk begins with either at
             random, and an agent takes the one that is nearer to what it read before.
     """
 

@@ -155,11 +155,11 @@ def polarisation(
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
     """Polarisation of the sky by single Rayleigh scattering.
 
-    At an angle g from the sun its degree is MAX_POLARISATION sin^2 g / (1 + cos^2 g), and the light swings at right angles to the
+    At an angle g from the sun its degree is MAX_POLARISATION sin^2 g / (1 + cos^2 g), and its e-vector is at right angles to the
     plane through the sun, the eye, and the point of the sky. Clouds weaken it.
 
     Returns:
-        The degree (0..1), and the e-vectors: unit vectors along which the light swings; 0 at the sun.
+        The degree (0..1), and the e-vectors: unit vectors; 0 at the sun.
     """
     cosine = directions @ light.sun
     degree = MAX_POLARISATION * (1 - light.clouds) * (1 - cosine**2) / (1 + cosine**2)

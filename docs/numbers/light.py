@@ -64,7 +64,7 @@ def draw_sky(path: Path) -> None:
         figure = Figure(figsize=(8, 3.9), layout="constrained")
         shown = {
             "brightness, as a multiple of that overhead": np.minimum(sky_luminance(light, flat), 8),
-            "degree of polarisation, and how the light swings": degree,
+            "degree of polarisation, and e-vectors": degree,
         }
         for axes, (title, values) in zip(
             figure.subplots(1, 2, subplot_kw={"projection": "polar"}), shown.items(), strict=True
@@ -83,7 +83,7 @@ def draw_sky(path: Path) -> None:
 
 
 def _draw_vectors(axes, light: Light) -> None:
-    """Short lines along which the light swings."""
+    """Short lines along e-vectors."""
     for zenith in np.radians([15, 30, 45, 60, 75]):
         for azimuth in np.linspace(0, 2 * np.pi, round(24 * math.sin(zenith)) + 4, endpoint=False):
             level = math.sin(zenith)

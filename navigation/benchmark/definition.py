@@ -46,7 +46,7 @@ BASE = Experiment(
 
 
 class Asked(NamedTuple):
-    """What tells the runs of an entry apart: condition (empty for none), world, seed, noise (degrees), and displacement (m)."""
+    """What distinguishes the runs of an entry: condition (empty for none), world, seed, noise (degrees), and displacement (m)."""
 
     condition: str
     world: str

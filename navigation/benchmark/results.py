@@ -28,7 +28,7 @@ TIMES = {
 }  # of a result, and of a run in the table of a sweep
 RESULTS = "results"  # the folder of the results, next to the runs, which are a sweep's with files of its own
 LIMIT = 2**63  # numbers of a result are smaller
-RUN_FIELDS = Asked._fields  # of a line: what tells the runs of an entry apart
+RUN_FIELDS = Asked._fields  # of a line: what distinguishes the runs of an entry
 
 
 @settings
