@@ -59,6 +59,7 @@ SENSES = Registry(
         "dorsal-rim": "tussock.navigation.sky_compass:DorsalRim",
     },
 )
+COMPARED = ("ideal", "robot", "svo-gtsam", "stankiewicz-webb", "ant", "bee")  # by Bee-Nav (2026)
 
 
 def as_senses(value: Any) -> Spec:

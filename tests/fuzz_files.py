@@ -16,6 +16,7 @@ from PIL import Image
 from tussock.render import Eye, open_renderer
 from tussock.world.files import read_world, write_world
 from tussock.world.heading_names import HEADINGS
+from tussock.world.meshes.ply_header import comments_of, read_header
 from tussock.world.route_files import read_route
 from tussock.world.scene import World
 
@@ -99,7 +100,8 @@ def glb_parts(data: bytes):
 
 
 GLBS = [glb_parts(data) for data in WORLDS["glb"]]
-COMMENT = json.loads(WORLDS["ply"][0].partition(b"comment tussock ")[2].partition(b"\n")[0])
+COMMENT = read_header(WORLDS["ply"][0]).comment("tussock")
+LINES = comments_of("tussock", COMMENT).encode()
 
 
 @holds(120)
@@ -115,8 +117,9 @@ def world_trees(parts):
 def world_metadata(comment, kind):
     path = FOLDER / f"metadata.{kind}"
     if kind == "ply":
-        head, _, rest = WORLDS["ply"][0].partition(b"comment tussock ")
-        path.write_bytes(head + b"comment tussock " + json.dumps(comment).encode() + b"\n" + rest.partition(b"\n")[2])
+        data = WORLDS["ply"][0]
+        assert LINES in data
+        path.write_bytes(data.replace(LINES, comments_of("tussock", comment).encode()))
     else:
         tree, rest = glb_parts(WORLDS["glb"][0])
         tree["scenes"][0]["extras"]["tussock"] = comment

@@ -53,7 +53,7 @@ def test_the_covered_ground_is_not_of_one_colour(preset, low, high):
 
 def test_speckles_cover_the_ground_once():
     params = WorldParams(field_width=3.0, field_depth=2.0, ground_margin=7.0, speckle=0.2, speckle_size=0.2)
-    triangles, rgb = speckles(params, np.random.default_rng(1))
+    triangles, rgb, _ = speckles(params, np.random.default_rng(1))
     a, b, c = np.moveaxis(triangles[..., :2].astype(float), 1, 0)
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
     assert np.abs(area).sum() == pytest.approx(17 * 16, rel=1e-5)
@@ -72,7 +72,7 @@ def test_moss_covers_its_share_of_the_ground():
 
 
 def test_a_ground_of_one_colour_has_no_speckles():
-    assert len(speckles(WorldParams(), np.random.default_rng(1))[0]) == 0
+    assert len(speckles(WorldParams(), np.random.default_rng(1)).rgb) == 0
 
 
 def test_the_cover_of_the_ground_is_no_obstacle():
@@ -108,7 +108,7 @@ def test_a_hedge_closes_the_horizon(size):
 @pytest.mark.parametrize("tone", [0.0, 1.0])
 def test_the_leaves_of_a_tree_belong_to_its_branches(forks, tone):
     params = WorldParams(tree_forks=forks, tree_leaves=400, tree_height=4.0)
-    triangles, rgb = branching_tree(params, 4.0, tone, np.random.default_rng(forks))
+    triangles, rgb, _ = branching_tree(params, 4.0, tone, np.random.default_rng(forks))
     assert len(triangles) == len(rgb) < 3000
     wood, leaves = triangles[:-400], triangles[-400:]
     share = np.linspace(0, 1, 9)[:, None, None]

@@ -11,7 +11,7 @@ from ...body import Body
 from ...experiment import Experiment
 from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
-from ...sense_models import SENSES
+from ...sense_models import COMPARED
 from ...stopping import StoppingRules
 from ...sweeps.spec import Change
 from ...training_setup import TrainingSetup
@@ -46,7 +46,7 @@ def steering() -> list[Change]:
     noisy: list[Change] = [
         {"navigator": navigator, "senses": senses} | body
         for navigator, body in ((OF_NETWORK, BODY), (VECTOR, {}))
-        for senses in SENSES.builtin
+        for senses in COMPARED
     ]
     return [
         *noisy,

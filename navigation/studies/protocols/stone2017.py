@@ -10,7 +10,7 @@ from tussock.world.progress import Progress, no_progress
 
 from ...reports.claims import Decision, claim
 from ...reports.results import StudyResults
-from ...sense_models import SENSES, as_senses
+from ...sense_models import COMPARED, as_senses
 from ...steering.ring_circuit import CentralComplex
 from ..outbound_paths import Flight, HomeVectorErrors, errors_of, fly_home, home_vectors, random_flights
 from ..sensed_paths import errors_of_senses
@@ -121,7 +121,7 @@ def _shown(flight: Flight, way: Float[np.ndarray, "n steps 2"]) -> pd.DataFrame:
 def _of_senses(paths: int, seed: int) -> list[dict[str, object]]:
     headings = random_flights(paths, SENSED_STEPS[-1], np.random.default_rng([seed, 2])).heading
     rows = []
-    for number, name in enumerate(SENSES.names):
+    for number, name in enumerate(COMPARED):
         senses, random = as_senses(f"{name} speed={SENSED_SPEED}").make(), np.random.default_rng([seed, 3, number])
         rows += _error_rows(
             "senses", name, errors_of_senses(senses, headings, SENSED_STEP, np.array(SENSED_STEPS), random)
