@@ -550,7 +550,7 @@ def test_a_measured_result_is_obtained_again():
     run = next(BENCHMARK.by_world())[1]
     then = measured.runs[1]
     assert (run.world, run.seed, run.body.heading_noise, run.start_offset) == ("tussock-field", 1000, 0.0, 0.0)
-    assert then.asked == ("tussock-field", 1000, 0.0, 0.0)
+    assert then.asked == ("", "tussock-field", 1000, 0.0, 0.0)
     trained = learn(run, draw(run, run.open_world_and_route()))
     with trained.renderer:
         now = walk([run], trained)[0].results
