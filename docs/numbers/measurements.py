@@ -52,8 +52,9 @@ def measure_test_bed(folder: Path) -> Values:
 
 
 def measure_test_bed_3(folder: Path) -> Values:
-    """Two models on tussock-3, and perfect memory with other encodings; the results are in docs/benchmark/tussock-3."""
-    entries = [("perfect-memory", "grey"), ("perfect-memory", "uv"), ("perfect-memory,chain", "edges")]
+    """Five models on tussock-3, and perfect memory with other encodings; the results are in docs/benchmark/tussock-3."""
+    named = "perfect-memory,chain,random,visual-compass,infomax"
+    entries = [("perfect-memory", "grey"), ("perfect-memory", "uv"), (named, "edges")]
     for model, encoding in entries:
         tussock(
             folder, "benchmark", "--test-bed", "tussock-3", "--model", model, "--encoding", encoding, "--out", "bed"
@@ -116,7 +117,7 @@ MEASUREMENTS = (
             slow=True,
         ),
         "test-bed-3": Measurement(
-            "`tussock benchmark --test-bed tussock-3 --model perfect-memory,chain`; perfect memory with `--encoding grey` and `uv`, too",
+            "`tussock benchmark --test-bed tussock-3 --model NAME`; perfect memory with `--encoding grey` and `uv`, too",
             measure_test_bed_3,
             {"leaderboard": lambda values: "\n" + leaderboard(read_results(RESULTS_3))},
             slow=True,
