@@ -24,9 +24,7 @@ def lit_world(surroundings: "Surroundings") -> World:
     if given is None or given.unlit is None or light is not None:
         world = world_and_ground(surroundings, given)
     else:
-        before = dataclasses.replace(
-            given.unlit, sky_rgb=given.sky_rgb, field=given.field, double_sided=given.double_sided
-        )
+        before = given.without_light()
         world, light = world_and_ground(surroundings, before), given.light
         if world is before:
             return given

@@ -1,6 +1,5 @@
 """Views of a world that has changed since its views were learned."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -35,11 +34,7 @@ def changed_world(world: World, change: Change, seed: int = 0, route: Route | No
                 f"{str(change)!r} changes the sun, and this world has none: give --light, such as --light sun"
             )
         return change.apply(world, seed, route, state)
-    before, light = world, change.lit(world.light)
-    if world.unlit is not None:  # what was set since then holds on
-        before = dataclasses.replace(
-            world.unlit, sky_rgb=world.sky_rgb, field=world.field, double_sided=world.double_sided
-        )
+    before, light = world.without_light(), change.lit(world.light)
     changed = change.apply(before, seed, route, state)
     return world if changed is before and light == world.light else lit(changed, light)
 

@@ -1,10 +1,11 @@
 """A world in the light of a sun and a sky: shadows and brightness become part of the colours of its triangles and of its ground.
 
-Then every renderer draws them, at no cost. A triangle has one share of sunlight, that of POINTS points spread over it; the flat
+Then every renderer draws them as any other colours. A triangle has one share of sunlight, that of POINTS points spread over it; the flat
 ground has textures, with sun or shadow in each texel. The mathematics of light is in world/light.py.
 """
 
 import dataclasses
+import logging
 import math
 
 import numpy as np
@@ -19,6 +20,8 @@ from tussock.world.terrain import Terrain
 from tussock.world.textures import Texture, Texturing, product_table, to_display
 
 from .shadows import in_the_sun, in_the_sun_on_a_level
+
+log = logging.getLogger(__name__)
 
 POINTS = {1: 4e-4, 4: 25e-4, 16: math.inf}  # points on a triangle, and the largest area of such triangles (m^2)
 TEXEL = 0.01  # m; of the ground in the field and BORDER around it
@@ -39,6 +42,8 @@ def lit(world: World, light: Light) -> World:
             "the world is lit by a sun already; "
             + ("write it without a light, and give --light" if world.unlit is None else "light World.unlit")
         )
+    if world.texturing is not None and world.texturing.may_have_holes().any():
+        log.warning("triangles with holes in their textures cast whole shadows")
     reflectance = world.rgb if world.reflectance is None else world.reflectance
     brightness = np.rint(255 * to_display(light_on_triangles(world, light))).astype(np.uint8)
     rgb = product_table()[reflectance, brightness[:, None]]

@@ -83,9 +83,7 @@ def _shade(triangles, sun, z, corner, size, lit):
     xs, ys = np.empty(4), np.empty(4)  # of the shadow, in cells
     for i in range(len(triangles)):
         count = 0
-        for k in range(
-            3
-        ):  # what is above the plane: the triangle, a part of it with three corners or with four, or nothing
+        for k in range(3):  # the shadow of what is above the plane, which has up to four corners
             ax, ay, az = triangles[i, k, 0], triangles[i, k, 1], triangles[i, k, 2] - z
             m = (k + 1) % 3
             bx, by, bz = triangles[i, m, 0], triangles[i, m, 1], triangles[i, m, 2] - z
@@ -110,7 +108,8 @@ def _shade(triangles, sun, z, corner, size, lit):
                     continue
                 rise = ys[m] - ys[k]
                 share = (row - ys[k]) / rise if rise != 0.0 else 0.0
-                at, end = xs[k] + share * (xs[m] - xs[k]), xs[m] if rise == 0.0 else xs[k] + share * (xs[m] - xs[k])
+                at = xs[k] + share * (xs[m] - xs[k])
+                end = xs[m] if rise == 0.0 else at
                 left, right = min(left, min(at, end)), max(right, max(at, end))
             for column in range(math.ceil(max(left, 0.0)), math.floor(min(right, columns - 1.0)) + 1):
                 lit[row, column] = False

@@ -36,8 +36,8 @@ PRESSURE = 1010.0  # hPa; the atmosphere lifts the sun by half a degree at the h
 REFRACTED = math.radians(-0.575)  # no light of the sun comes around the earth from below this
 CLEAR_SKY = (-1.0, -0.32, 10.0, -3.0, 0.45)  # a, b, c, d, e of ISO 15469, type 12
 OVERCAST_SKY = (4.0, -0.70, 0.0, -1.0, 0.0)  # type 1
-GREY = 0.6  # how far an overcast sky loses its colour; a clear one is bluer than that of one colour, by its own ratios again
-BRIGHT_PART = 0.7  # the brightest part of the sky, above this share of it, has its full colour or is brighter
+GREY = 0.6  # share of its colour that an overcast sky loses; a clear sky is bluer than the world's sky of one colour
+BRIGHT_PART = 0.7  # quantile of the brightness of the sky at which it has the world's sky colour
 
 
 @settings

@@ -173,6 +173,12 @@ class World:
             )
         return change.apply(self, seed, route)
 
+    def without_light(self) -> "World":
+        """The world before a light was put on it, with the sky, the field and the sides that it has now; itself where that is not known."""
+        if self.unlit is None:
+            return self
+        return dataclasses.replace(self.unlit, sky_rgb=self.sky_rgb, field=self.field, double_sided=self.double_sided)
+
     def ground_height(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
         """Height of what agents stand or fly on at positions (both m): 0, or that of the terrain; nan where it has no ground."""
         return np.zeros(len(xy)) if self.terrain is None else self.terrain.height(xy)

@@ -199,7 +199,7 @@ def _tasks(
 
 
 def side_by_side(runs: dict[str, Experiment], workers: int) -> list[list[str]]:
-    """Which runs walk together, as keys: runs of one model in one world, so many that all workers are busy. One world after the other."""
+    """Which runs walk together, as keys: runs of one model in one world, enough of them for all workers. One world after the other."""
     groups: dict[tuple[str, ...], list[str]] = {}
     first: dict[str, int] = {}  # when a world, views and a model are first needed
     keys = Keys()
