@@ -14,6 +14,7 @@ from jaxtyping import Float32
 
 from tussock.render.eye import Eye
 from tussock.render.receptors import receptors_of
+from tussock.render.spectrum import HUMAN
 from tussock.world.errors import SettingError
 from tussock.world.registry import Registry, suggestion
 from tussock.world.specs import signature_of
@@ -24,7 +25,7 @@ from .encoding_steps import STEPS as BUILTIN
 from .encoding_steps import Blur, EncodingStep, Images, Normalise, Resize, Scale, Views, Visible
 from .encoding_steps_colour import COLOUR_STEPS
 from .encoding_steps_published import STEPS as PUBLISHED
-from .encoding_steps_ultraviolet import REFLECTANCE, ULTRAVIOLET_STEPS
+from .encoding_steps_ultraviolet import REFLECTANCE, ULTRAVIOLET_STEPS, of_insects
 from .eye_encoding import EyeEncoding
 from .feature_mask import FeatureMask
 
@@ -111,6 +112,8 @@ class Encoding:
 
     def for_eye(self, eye: Eye) -> "EyeEncoding":
         """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
+        if eye.spectrum != HUMAN:
+            return attrs.evolve(self, steps=map(of_insects, self.steps)).for_eye(attrs.evolve(eye, spectrum=HUMAN))
         if eye.compound is not None:
             return self._for_ommatidia(eye)
         known = eye.known
@@ -174,7 +177,10 @@ class Encoding:
         return self._text(STEPS.name_in_files)
 
     def _text(self, name_of: Callable[[type], str]) -> str:
-        steps = [[name_of(type(step)), *map(format_number, parameters_of(step))] for step in self.steps]
+        numbers = [[each for each in parameters_of(step) if each is not None] for step in self.steps]
+        steps = [
+            [name_of(type(step)), *map(format_number, each)] for step, each in zip(self.steps, numbers, strict=True)
+        ]
         texts = list(map(" ".join, steps))
         return " | ".join(texts if len(texts) != 1 else [*texts, "resize 1"])  # one word alone may be a preset's name
 

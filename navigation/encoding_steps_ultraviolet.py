@@ -1,8 +1,8 @@
 """Steps of encodings for what insects see in green and in ultraviolet.
 
 In the ultraviolet the sky is bright and the ground is dark, plants and soil alike, in any weather: a tenth of the light or less comes back
-from them. So the skyline is where the ultraviolet drops (Moeller 2002; Differt and Moeller 2015). Worlds have no colours in the
-ultraviolet. Here the open sky is 1, and all else reflects one share of it.
+from them. So the skyline is where the ultraviolet drops (Moeller 2002; Differt and Moeller 2015). Views of an eye with the spectrum of
+insects show the ultraviolet (render/spectrum.py). Of other views, and of recorded images, the open sky is 1, and all else is `reflectance`.
 """
 
 from typing import ClassVar
@@ -34,15 +34,17 @@ class Ultraviolet(PixelStep):
     """What ultraviolet receptors see, 0..1: open sky is 1, and all else is dark. The sky is found as `foreground-mask` finds it.
 
     Attributes:
-        reflectance: Of all that is not sky.
+        reflectance: Of all that is not sky. None: views show the ultraviolet in place of red.
     """
 
     name: ClassVar[str] = "ultraviolet"
     takes_views: ClassVar[bool] = True
     estimates_sky: ClassVar[bool] = True
-    reflectance: float = number(low=0, high=1)
+    reflectance: float | None = number(low=0, high=1, optional=True)
 
     def __call__(self, images: Views) -> Images:
+        if self.reflectance is None:
+            return images[..., 0] * np.float32(1 / 255)
         return 1 - np.float32(1 - self.reflectance) * ForegroundMask()(images)
 
 
@@ -57,7 +59,7 @@ class UltravioletGreen(PixelStep):
     name: ClassVar[str] = "ultraviolet-green"
     takes_views: ClassVar[bool] = True
     estimates_sky: ClassVar[bool] = True
-    reflectance: float = number(low=0, high=1)
+    reflectance: float | None = number(low=0, high=1, optional=True)
 
     def __call__(self, images: Views) -> Images:
         ultraviolet, green = Ultraviolet(self.reflectance)(images), GreenChannel()(images)
@@ -81,7 +83,7 @@ class UltravioletAndGreen(EncodingStep):
     name: ClassVar[str] = "ultraviolet-and-green"
     takes_views: ClassVar[bool] = True
     estimates_sky: ClassVar[bool] = True
-    reflectance: float = number(low=0, high=1)
+    reflectance: float | None = number(low=0, high=1, optional=True)
 
     def __call__(self, images: Views) -> Float32[np.ndarray, "n both_planes w"]:
         return np.concatenate([Ultraviolet(self.reflectance)(images), GreenChannel()(images)], axis=1)
@@ -91,4 +93,10 @@ class UltravioletAndGreen(EncodingStep):
         return np.concatenate([mask, mask])
 
 
-ULTRAVIOLET_STEPS = (GreenChannel, Ultraviolet, UltravioletGreen, UltravioletAndGreen)
+OF_REFLECTANCE = (Ultraviolet, UltravioletGreen, UltravioletAndGreen)
+ULTRAVIOLET_STEPS = (GreenChannel, *OF_REFLECTANCE)
+
+
+def of_insects(step: EncodingStep) -> EncodingStep:
+    """A step for views that show the ultraviolet in place of red."""
+    return attrs.evolve(step, reflectance=None) if isinstance(step, OF_REFLECTANCE) else step

@@ -43,8 +43,8 @@ ROUTE_SETTINGS = (
     "grid_database",
 )  # decide world and route
 VIEW_SETTINGS = (  # decide with these the views that are learned
-    "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "side", "overlap_deg", "mask", "eye", "threads",
-    "gaze", "body_length_m", "pitch_noise_deg", "roll_noise_deg",
+    "size", "renderer", "samples", "eye_height_m", "top_deg", "bottom_deg", "field_deg", "side", "overlap_deg", "mask", "eye", "spectrum",
+    "threads", "gaze", "body_length_m", "pitch_noise_deg", "roll_noise_deg",
     "encoding", "resize", "blur", "spacing_m", "every", "learning_walk_m", "parallel_views",
     "goal_walk_m", "goal_turns", "goal_views", "goal_spread_deg", "goal_only",
 )  # fmt: skip

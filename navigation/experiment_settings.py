@@ -20,6 +20,7 @@ from tussock.render.eye import Eye
 from tussock.render.posture import Posture
 from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
+from tussock.world.settings import shown
 
 from .body import Body
 from .content import label_of
@@ -158,7 +159,7 @@ def _check_databases(given: Mapping[str, Any]) -> None:
 def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings) -> Eye:
     size = given.get("size") or (f"{known.width}x{known.height}" if known is not None else None)
     pixels = {} if size is None else dict(zip(("width", "height"), width_and_height(size), strict=True))
-    kept = ("field", "side", "overlap", "mask", "known", "compound")
+    kept = ("field", "side", "overlap", "mask", "known", "compound", "spectrum")
     fields: dict[str, Any] = {**pixels} if known is None else pixels | {name: getattr(known, name) for name in kept}
     fields |= fields_of(given, "eye")
     if fields.get("compound") is not None:
@@ -172,12 +173,20 @@ def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings
 
         eye = eye_of(surroundings.route_database, surroundings.grid_database, fields)
     if known is not None and eye != known:
-        raise SettingError(
-            f"{given['model']} learned through another eye ({known}) than is asked for ({eye}); "
-            "give the same --size, --samples, --eye-height-m, --top-deg, --bottom-deg, --eye, --side, --overlap-deg, "
-            "--field-deg and --mask, or none"
-        )
+        raise SettingError(f"{given['model']} learned through another eye: {_differences(known, eye)}train anew")
     return eye
+
+
+def _differences(known: Eye, asked: Eye) -> str:
+    """In what two eyes differ, and which flags make it so."""
+    flags = {field.removeprefix("eye."): name for name, field in FIELDS.items()} | {"width": "size", "height": "size"}
+    differing = [each for each in attrs.fields(Eye) if getattr(known, each.name) != getattr(asked, each.name)]
+    values = [
+        [f"{each.name} {shown(getattr(eye, each.name), each.metadata)}" for each in differing] for eye in (known, asked)
+    ]
+    given = dict.fromkeys(f"--{flags[each.name].replace('_', '-')}" for each in differing if each.name in flags)
+    leave = f"leave out {', '.join(given)}, or " if given else ""
+    return f"{', '.join(values[0])}, not {', '.join(values[1])}; {leave}"
 
 
 def width_and_height(size: str) -> tuple[int, int]:

@@ -35,6 +35,7 @@ _SETTINGS: dict[str, tuple[Any, str]] = {
     "overlap_deg": (float, "eye.overlap"),
     "mask": (str | None, "eye.mask"),
     "eye": (str | None, "eye.compound"),
+    "spectrum": (str, "eye.spectrum"),
     "cull_back_faces": (bool, "cull_back_faces"),
     "light": (str | None, "light"),
     "gaze": (str, "posture.gaze"),

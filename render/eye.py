@@ -10,6 +10,7 @@ from tussock.world.settings import MAX_COORDINATE, choice, converted, number, se
 
 from .compound import CompoundEye, as_compound
 from .mask import Mask, as_mask
+from .spectrum import HUMAN, as_spectrum
 
 if TYPE_CHECKING:  # the command line reads the defaults: without numpy, its help appears at once
     import numpy as np
@@ -51,6 +52,8 @@ class Eye:
         known: Which pixels of a recorded image show the world, given as `mask` is: not those behind the body of the robot, or beyond
             the field of its camera. None means all.
         compound: The ommatidia of a compound eye, which see parts of the panorama (`compound_eye`). None: the pixels are what it sees.
+        spectrum: "human": views show red, green and blue. "insect": they show ultraviolet in place of red; "insect ground=0.2" says
+            how much of it something reflects (see `Insect`).
     """
 
     width: int = whole(720, low=4, high=32768, unit="pixels")
@@ -65,6 +68,7 @@ class Eye:
     mask: Mask | None = converted(default=None, converter=_mask, takes_self=True)
     known: Mask | None = converted(default=None, converter=_mask, takes_self=True)
     compound: CompoundEye | None = converted(default=None, converter=_compound)
+    spectrum: str = converted(default=HUMAN, converter=as_spectrum)
 
     def __attrs_post_init__(self):
         if self.bottom >= self.top:
@@ -166,7 +170,7 @@ class Eye:
         return views * self.visible()[..., None] if self.masked else views
 
     def plain(self) -> dict[str, Any]:
-        """Its fields by name, for files: numbers and texts. Where all is visible, nothing is said of that, as in earlier files."""
+        """Its fields by name, for files: numbers and texts. What is usual and newer than the first files is left out."""
         fields = attrs.asdict(self)
         fields["compound"] = None if self.compound is None else str(self.compound)  # plain, as other libraries write it
         sides = self.side != "both"
@@ -177,6 +181,7 @@ class Eye:
             "mask": self.masked,
             "known": self.known is not None,
             "compound": self.compound is not None,
+            "spectrum": self.spectrum != HUMAN,
         }
         return {name: value for name, value in fields.items() if said.get(name, True)}
 

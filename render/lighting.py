@@ -89,10 +89,7 @@ def _spread(count: int) -> Float[np.ndarray, "count 3"]:
 
 def _shaded(texturing: Texturing, rgb: UInt8[np.ndarray, "n 3"], brightness: UInt8[np.ndarray, " n"]) -> Texturing:
     """Textures on triangles of some brightness (display values): the colours of their corners are darker."""
-    colours = texturing.colours
-    if colours is None:
-        colours = np.full((len(rgb), 3, 4), 255, np.uint8)
-        colours[texturing.index < 0, :, :3] = rgb[texturing.index < 0, None]
+    colours = texturing.corner_colours(rgb)
     darker = colours.copy()
     darker[..., :3] = product_table()[colours[..., :3], brightness[:, None, None]]
     return dataclasses.replace(texturing, colours=darker)

@@ -22,6 +22,7 @@ from tussock.world.textures import Texturing
 
 from .cubemap import Cubemap, Face, face_size_for
 from .eye import Eye
+from .false_colours import seen_colours
 from .gl import Context, Framebuffer, open_context
 from .poses import AnyPoses, Views, poses_of_eye
 from .sky import add_sky
@@ -52,7 +53,7 @@ class RasterRenderer:
         from pyrender.shader_program import ShaderProgramCache
 
         self._flags = pyrender.RenderFlags.FLAT
-        self._scene, self._camera = _scene(world, self._cubemap)
+        self._scene, self._camera = _scene(seen_colours(world, eye.spectrum), self._cubemap)
         with self._context:
             self._framebuffer = Framebuffer(self._cubemap.size, self._cubemap.rows)
             _check_sizes(world.texturing)

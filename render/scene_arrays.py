@@ -10,6 +10,7 @@ from tussock.world.textures import WRAPS, product_table
 
 from .colour_kernels import PLAIN
 from .eye import Eye
+from .false_colours import seen_colours
 from .triangle_tree import tree_of
 
 
@@ -144,8 +145,9 @@ class Scene(NamedTuple):
     @classmethod
     def of(cls, world: World, eye: Eye) -> "Scene":
         """That of a world, seen by an eye."""
-        _, rgb = world.surfaces()
         tree = tree_of(world)
+        world = seen_colours(world, eye.spectrum)
+        _, rgb = world.surfaces()
         labels = len(rgb) - tree.order  # of equally near triangles the first is seen
         triangles = Triangles(tree.corners, labels, np.ascontiguousarray(tree.boxes.T), not world.double_sided)
         elevations = eye.elevations(eye.rays)

@@ -9,10 +9,12 @@ from tussock.world.full_pose import eye_axes
 from tussock.world.geometry import column_azimuths
 from tussock.world.light import sky_colours
 from tussock.world.scene import World, once_per_world
+from tussock.world.settings import RGB
 
 from .compile import compiled
 from .eye import Eye
 from .poses import Views
+from .spectrum import HUMAN
 
 PER_DEGREE = 2  # entries of the table of the sky
 
@@ -32,18 +34,32 @@ def add_sky(
     if world.light is None:
         return
     directions, columns = (column_azimuths(eye.width), eye.elevations()), (start, eye.width if stop is None else stop)
-    _add(_table(world), *directions, poses, eye_axes(poses), *columns, views)
+    table = _table(world) if eye.spectrum == HUMAN else _insect_table(world)
+    _add(table, *directions, poses, eye_axes(poses), *columns, views)
 
 
 @once_per_world
 def _table(world: World) -> Float32[np.ndarray, "rows columns 3"]:
+    """Those of a world's own sky."""
+    return _colours(world, world.sky_rgb)
+
+
+@once_per_world
+def _insect_table(world: World) -> Float32[np.ndarray, "rows columns 3"]:
+    """The same with ultraviolet in place of red: as bright as a white sky is."""
+    table = _table(world).copy()
+    table[..., 0] = _colours(world, (255, 255, 255))[..., 0]
+    return table
+
+
+def _colours(world: World, sky_rgb: RGB) -> Float32[np.ndarray, "rows columns 3"]:
     """Colours of the sky (0..255): rows by elevation from the horizon up, columns by azimuth from -180 degrees to 180 degrees."""
     assert world.light is not None
     elevation = np.radians(np.arange(90 * PER_DEGREE + 1) / PER_DEGREE)[:, None]
     azimuth = np.radians(np.arange(360 * PER_DEGREE + 1) / PER_DEGREE - 180)
     level = np.cos(elevation)
     directions = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation) + 0 * azimuth], axis=-1)
-    colours = sky_colours(world.light, world.sky_rgb, directions.reshape(-1, 3))
+    colours = sky_colours(world.light, sky_rgb, directions.reshape(-1, 3))
     return colours.reshape(*directions.shape).astype(np.float32)
 
 

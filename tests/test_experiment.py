@@ -281,7 +281,7 @@ OTHER: dict[str, Any] = {
     "ground": "mesh", "max_slope_deg": 30.0, "altitude_m": 0.5,
     "seed": 6, "size": "180x40", "renderer": "cpu", "samples": 2, "eye_height_m": 0.02,
     "top_deg": 50.0, "bottom_deg": -20.0, "field_deg": 270.0,
-    "side": "left", "overlap_deg": 20.0, "eye": "ant", "mask": "mask.png", "cull_back_faces": True,
+    "side": "left", "overlap_deg": 20.0, "eye": "ant", "spectrum": "insect ground=0.2", "mask": "mask.png", "cull_back_faces": True,
     "light": "overcast",
     "route": "route.csv", "route_seed": 5, "route_length_m": 7.0,
     "headings": "bearing", "columns": "x,y", "smooth_m": 0.1,
@@ -374,7 +374,9 @@ def test_a_field_and_a_mask_are_known_from_the_file_of_a_model(tmp_path):
     save_model(TrainedModel(model=model, encoding=encoding, eye=eye), tmp_path / "model.safetensors")
     given = {"model": str(tmp_path / "model.safetensors")}
     assert experiment_of(given).eye == experiment_of(given | {"field_deg": 270.0}).eye == eye
-    with pytest.raises(SettingError, match="--field-deg and --mask"):
+    with pytest.raises(
+        SettingError, match="field 4.71239 rad .270 degrees., not field .* leave out --field-deg, or train"
+    ):
         experiment_of(given | {"field_deg": 280.0})
     for wrong in (eye, Eye(field=math.pi)):
         with pytest.raises(SettingError, match="not trained for what this eye sees"):

@@ -124,7 +124,7 @@ def test_the_digest_depends_on_every_setting_of_a_run(tmp_path):
         "blur": 1.0, "spacing_m": 0.2, "every": 2, "learning_walk_m": 0.0, "parallel_views": 3, "device": "cpu:0", "threads": None,
         "step_m": 0.1, "scan_deg": 90.0, "scan_about_deg": 10.0, "on_lost": "reset", "waypoint_m": 0.2, "put_back_ahead_m": 0.3,
         "arrive_m": 0.2, "lost_m": 0.6, "patience_m": 2.0, "max_steps": 9, "field_deg": 270.0,
-        "side": "left", "overlap_deg": 20.0, "eye": "ant", "mask": str(tmp_path / "mask.png"),
+        "side": "left", "overlap_deg": 20.0, "eye": "ant", "spectrum": "insect", "mask": str(tmp_path / "mask.png"),
         "goal_walk_m": 1.0, "goal_views": 9, "goal_turns": 3.0, "goal_spread_deg": 20.0, "collisions": "slide", "body_radius_m": 0.01,
         "senses": "ant", "release_deg": 30.0, "displace_at": 0.4, "displace_m": 0.3,
         "test_change": "removed amount=0.2", "change_seed": 5,

@@ -119,6 +119,14 @@ class Texturing:
             parts += [repr(settings).encode(), texture.rgba.tobytes()]
         return b"".join(parts)
 
+    def corner_colours(self, rgb: UInt8[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "n 3 4"]:
+        """`colours`, also where that is None; `rgb` are the colours of the triangles that have no texture."""
+        if self.colours is not None:
+            return self.colours
+        colours = np.full((len(self.index), 3, 4), 255, np.uint8)
+        colours[self.index < 0, :, :3] = rgb[self.index < 0, None]
+        return colours
+
     def may_have_holes(self) -> np.ndarray:
         """(n,) whether a triangle may have holes: its texture, or its corners, have an alpha below the threshold."""
         thresholds = np.array([texture.threshold for texture in self.textures] + [0.0])

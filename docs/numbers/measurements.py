@@ -12,6 +12,7 @@ import ommatidia
 import pictures
 import processors
 import protocols
+import spectrum
 import steering
 from measurement import RESULTS, Measurement, Values, arrivals, of, seeds, sussex, sweep, tussock
 
@@ -92,6 +93,7 @@ MEASUREMENTS = (
     | pictures.MEASUREMENTS
     | processors.MEASUREMENTS
     | protocols.MEASUREMENTS
+    | spectrum.MEASUREMENTS
     | steering.MEASUREMENTS
     | {
         "learning-walks": Measurement(

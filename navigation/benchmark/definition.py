@@ -63,7 +63,7 @@ LATER = {
     "goal_spread_deg", "goal_only",
     "collisions", "body_radius_m", "senses", "release_m", "release_deg", "displace_at", "displace_m",
     "gaze", "body_length_m", "pitch_noise_deg", "roll_noise_deg",
-    "side", "overlap_deg", "eye", "test_change", "change_seed",
+    "side", "overlap_deg", "eye", "spectrum", "test_change", "change_seed",
 } - EARLY  # fmt: skip
 OF_ENTRY = ("world", "seed", "encoding", "model", "offset_m", "heading_noise_deg", "navigator")  # settings that differ
 

@@ -19,6 +19,7 @@ from tussock.world.scene import World
 from tussock.world.settings import shown
 
 from ..eye import Eye
+from ..spectrum import HUMAN
 from .database import Database, read_database
 from .entries import ENTRIES
 from .metadata import METADATA, group_in
@@ -111,7 +112,7 @@ def _recorded_eye(database: Database) -> dict[str, Any]:
     recorded = group_in(database.metadata, "tussock", "eye")
     if not recorded:
         height, width = first_view(database).shape[:2]
-        return {"width": width, "height": height}
+        return {"width": width, "height": height, "spectrum": HUMAN}
     names = {each.name for each in attrs.fields(Eye)}
     try:
         if unknown := recorded.keys() - names:
@@ -128,7 +129,8 @@ def _recorded_eye(database: Database) -> dict[str, Any]:
         raise FileError(
             f"{database.folder / METADATA}: its eye cannot be used ({first_line(error)}); repair it"
         ) from error
-    return {name: value for name, value in attrs.asdict(eye).items() if name in recorded and value is not None}
+    known = {name: value for name, value in attrs.asdict(eye).items() if name in recorded and value is not None}
+    return {"spectrum": HUMAN} | known
 
 
 def first_view(database: Database) -> UInt8[np.ndarray, "height width channels"]:
