@@ -10,6 +10,7 @@ from pictures import keep
 
 from tussock import Encoding, Eye, Light, World, draw_panorama, lit, open_renderer
 from tussock.navigation.reports.drawing import STYLE, save_picture
+from tussock.world.change import Change
 
 POSE, SEED = (4.3, 5.1, 0.3), 3
 LIGHT = Light(azimuth=math.radians(143), elevation=math.radians(30))
@@ -59,7 +60,11 @@ def draw(path: Path) -> None:
 def table(values: Values) -> str:
     """One line for each encoding and spectrum."""
     rows = [
-        [f"`{name.split(', ')[0]}`", name.split(", ")[1], *(of(arrived[change]) for change in CHANGES.values())]
+        [
+            f"`{name.split(', ')[0]}`",
+            name.split(", ")[1],
+            *(of(arrived[str(Change.parse(change))]) for change in CHANGES.values()),
+        ]
         for name, arrived in values["arrived"].items()
     ]
     return markdown(["encoding", "spectrum", *CHANGES], rows)
