@@ -53,6 +53,15 @@ def contents(folder: Path) -> dict[str, bytes]:
 # Help
 
 
+@pytest.mark.parametrize("arguments", [["--help"], ["models", "--help"]])
+def test_help_may_be_read_in_part(arguments):
+    reading, writing = os.pipe()
+    os.close(reading)  # as head does that has read enough
+    done = subprocess.run([TUSSOCK, *arguments], stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 def test_help_lists_every_command(capfd):
     code, out, _ = tussock(capfd, "--help")
     assert code == 0

@@ -37,12 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(0 if arguments else 2)
     if arguments[0] not in COMMANDS:
         fail(f"unknown command {arguments[0]!r}{suggestion(arguments[0], COMMANDS)}; tussock --help lists all")
-    command = tyro.cli(
-        choice_of({arguments[0]: command_of(*arguments[:2])}),
-        prog="tussock",
-        args=arguments,
-        config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-    )
+    command = command_with_flags(arguments)
     end_on_signals()
     try:
         check_names(command)
@@ -76,6 +71,21 @@ def main(arguments: list[str] | None = None) -> None:
     except KeyboardInterrupt:
         message("tussock: interrupted")
         sys.exit(130)
+
+
+def command_with_flags(arguments: list[str]) -> Any:
+    """The command that the arguments ask for. Exits where they ask for its help, or are wrong."""
+    with output_may_end():  # that of the help
+        try:
+            return tyro.cli(
+                choice_of({arguments[0]: command_of(*arguments[:2])}),
+                prog="tussock",
+                args=arguments,
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+            )
+        finally:
+            sys.stdout.flush()
+    sys.exit(0)
 
 
 def command_of(name: str, below: str = "") -> Any:
