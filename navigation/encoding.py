@@ -112,15 +112,13 @@ class Encoding:
 
     def for_eye(self, eye: Eye) -> "EyeEncoding":
         """This encoding for the views of an eye, which may have a field of view or a mask. Raises SettingError where it cannot be."""
-        if eye.spectrum != HUMAN:
-            return attrs.evolve(self, steps=map(of_insects, self.steps)).for_eye(attrs.evolve(eye, spectrum=HUMAN))
         if eye.compound is not None:
             return self._for_ommatidia(eye)
         known = eye.known
         one_column = any(getattr(step, "shows_one_column", False) for step in self.steps)
         visible = eye.visible() if eye.masked or known is not None or one_column else None
         if visible is None or (visible.all() and known is None and not one_column):
-            return EyeEncoding(self, None)
+            return EyeEncoding(self._seeing(eye), None)
         local, normalised, gain = self._without_normalise()
         chain = attrs.evolve(self, steps=local, rounded=not normalised)
         visible = chain.visible(visible)
@@ -130,7 +128,11 @@ class Encoding:
             )
         partial = known is not None
         mask = FeatureMask(torch.from_numpy(visible), normalised=normalised, gain=gain, partial=partial)
-        return EyeEncoding(chain, mask, known.visible() if partial else None)
+        return EyeEncoding(chain._seeing(eye), mask, known.visible() if partial else None)
+
+    def _seeing(self, eye: Eye) -> "Encoding":
+        """The chain for the channels that views of an eye show."""
+        return self if eye.spectrum == HUMAN else attrs.evolve(self, steps=map(of_insects, self.steps))
 
     def _for_ommatidia(self, eye: Eye) -> "EyeEncoding":
         """For a compound eye: all steps before the normalisation are of the panorama that its ommatidia look at."""
@@ -143,7 +145,7 @@ class Encoding:
             )
         visible = receptors_of(eye).visible(eye.ommatidia_in_field())
         chain = attrs.evolve(self, steps=(*local, SeenByOmmatidia(eye)), rounded=not normalised)
-        return EyeEncoding(chain, FeatureMask(torch.from_numpy(visible), normalised=normalised, gain=gain))
+        return EyeEncoding(chain._seeing(eye), FeatureMask(torch.from_numpy(visible), normalised=normalised, gain=gain))
 
     def _without_normalise(self) -> tuple[tuple[EncodingStep, ...], bool, float]:
         """The steps before normalise, whether there is one, and the factor by which its result is scaled. Raises SettingError."""
@@ -177,10 +179,7 @@ class Encoding:
         return self._text(STEPS.name_in_files)
 
     def _text(self, name_of: Callable[[type], str]) -> str:
-        numbers = [[each for each in parameters_of(step) if each is not None] for step in self.steps]
-        steps = [
-            [name_of(type(step)), *map(format_number, each)] for step, each in zip(self.steps, numbers, strict=True)
-        ]
+        steps = [[name_of(type(step)), *map(format_number, parameters_of(step))] for step in self.steps]
         texts = list(map(" ".join, steps))
         return " | ".join(texts if len(texts) != 1 else [*texts, "resize 1"])  # one word alone may be a preset's name
 

@@ -18,6 +18,7 @@ import attrs
 from tussock.render.compound import as_compound
 from tussock.render.eye import Eye
 from tussock.render.posture import Posture
+from tussock.render.spectrum import as_spectrum
 from tussock.world.errors import SettingError
 from tussock.world.meshes.reading import MeshReading
 from tussock.world.settings import shown
@@ -162,6 +163,8 @@ def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings
     kept = ("field", "side", "overlap", "mask", "known", "compound", "spectrum")
     fields: dict[str, Any] = {**pixels} if known is None else pixels | {name: getattr(known, name) for name in kept}
     fields |= fields_of(given, "eye")
+    if fields.get("spectrum") is not None:
+        fields["spectrum"] = as_spectrum(fields["spectrum"])
     if fields.get("compound") is not None:
         fields["compound"] = as_compound(fields["compound"])
         if surroundings.route_database is None:
@@ -173,19 +176,19 @@ def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings
 
         eye = eye_of(surroundings.route_database, surroundings.grid_database, fields)
     if known is not None and eye != known:
-        raise SettingError(f"{given['model']} learned through another eye: {_differences(known, eye)}train anew")
+        raise SettingError(f"{given['model']} learned through another eye: {_differences(known, eye, given)}train anew")
     return eye
 
 
-def _differences(known: Eye, asked: Eye) -> str:
-    """In what two eyes differ, and which flags make it so."""
+def _differences(known: Eye, asked: Eye, given: Mapping[str, Any]) -> str:
+    """In what two eyes differ, and which of the given settings make it so."""
     flags = {field.removeprefix("eye."): name for name, field in FIELDS.items()} | {"width": "size", "height": "size"}
     differing = [each for each in attrs.fields(Eye) if getattr(known, each.name) != getattr(asked, each.name)]
     values = [
         [f"{each.name} {shown(getattr(eye, each.name), each.metadata)}" for each in differing] for eye in (known, asked)
     ]
-    given = dict.fromkeys(f"--{flags[each.name].replace('_', '-')}" for each in differing if each.name in flags)
-    leave = f"leave out {', '.join(given)}, or " if given else ""
+    names = dict.fromkeys(flags[each.name] for each in differing if given.get(flags.get(each.name, "")) is not None)
+    leave = f"leave out {', '.join('--' + name.replace('_', '-') for name in names)}, or " if names else ""
     return f"{', '.join(values[0])}, not {', '.join(values[1])}; {leave}"
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tussock.world.errors import SettingError
+from tussock.world.plant_groups import GROUND
 from tussock.world.scene import World, once_per_world
-from tussock.world.terrain import Terrain
-from tussock.world.textures import Texturing, to_display
+from tussock.world.textures import Texturing, to_display, to_linear
 from tussock.world.world_plants import PIECE
 
 from .lighting import lit
@@ -43,16 +43,15 @@ def _in_ultraviolet(world: World, insect: Insect) -> World:
                 "--light"
             )
         return lit(_in_ultraviolet(world.without_light(), insect), world.light)
-    red = np.rint(255 * to_display(reflected(world, insect))).astype(np.uint8)
-    rgb = _with_red(world.rgb, red)
+    shares = reflected(world, insect)
+    rgb = _with_red(world.rgb, _display(shares * _shading(world)))
     ground = world.ground
     if ground is not None:
-        level = int(np.rint(255 * to_display(np.array(insect.ground))))
-        ground = dataclasses.replace(ground, rgb=(level, *ground.rgb[1:]))
+        ground = dataclasses.replace(ground, rgb=(_display(np.array([insect.ground])).item(), *ground.rgb[1:]))
     return dataclasses.replace(
         world,
         rgb=rgb,
-        reflectance=None if world.reflectance is None else _with_red(world.reflectance, red),
+        reflectance=None if world.reflectance is None else _with_red(world.reflectance, _display(shares)),
         ground=ground,
         texturing=world.texturing and _textured(world.texturing, rgb),
         sky_rgb=(255, *world.sky_rgb[1:]),
@@ -63,13 +62,24 @@ def reflected(world: World, insect: Insect) -> Float[np.ndarray, " n"]:
     """The share of the ultraviolet that each triangle of a world reflects."""
     shares = np.full(len(world.triangles), insect.other)
     shares_of = {"stone": insect.stones, "pebble": insect.stones, PIECE: insect.other}
-    if isinstance(world.terrain, Terrain) and world.terrain.part is not None:
-        shares[slice(*world.terrain.part)] = insect.ground
     if (groups := world.plants) is not None:
         of_kind = np.array([shares_of.get(kind, insect.plants) for kind in groups.kinds])
+        shares[groups.of == GROUND] = insect.ground
         plants = groups.of >= 0
         shares[plants] = of_kind[groups.kind[groups.of[plants]]]
     return shares
+
+
+def _shading(world: World) -> Float[np.ndarray, " n"]:
+    """The light in the colours of triangles, as a multiple of even light, as their green shows it; 1 where that is not known."""
+    if world.reflectance is None:
+        return np.ones(len(world.rgb))
+    shown, even = (to_linear(each[:, 1] / 255) for each in (world.rgb, world.reflectance))
+    return np.divide(shown, even, out=np.ones_like(even), where=even > 0)
+
+
+def _display(shares: Float[np.ndarray, "..."]) -> UInt8[np.ndarray, "..."]:
+    return np.rint(255 * to_display(np.clip(shares, 0, 1))).astype(np.uint8)
 
 
 def _with_red(rgb: UInt8[np.ndarray, "... c"], red: UInt8[np.ndarray, "..."]) -> UInt8[np.ndarray, "... c"]:

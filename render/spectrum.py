@@ -13,8 +13,8 @@ HUMAN = "human"
 class Insect:
     """Receptors for ultraviolet, green and blue. Views show the ultraviolet where they show people red.
 
-    There the sky is bright, and all else reflects little: grass and crops 0.02, bare soil 0.05 to 0.08, and dry bright sand 0.14 to
-    0.24 (315 to 400 nm, Feister and Grewe 1995); single leaves up to 0.06 (Grant et al. 2003).
+    There the sky is bright, and all else reflects little: grass and crops 0.02, bare soil 0.05 to 0.08 (315 to 400 nm), dry bright
+    sand 0.14 at 300 nm to 0.24 at 400 nm (Feister and Grewe 1995); single leaves up to 0.06 (Grant et al. 2003).
 
     Attributes:
         plants: Share of the ultraviolet that plants and litter reflect.
@@ -48,6 +48,8 @@ def _spec(text: str) -> Spec:
 
 
 def _find(name: str) -> type[Insect]:
+    if name == HUMAN:
+        raise SettingError("the spectrum human takes no parameters; insect does")
     if name != "insect":
         raise SettingError(f"unknown spectrum {name!r}; give human, insect, or 'insect ground=0.2'")
     return Insect

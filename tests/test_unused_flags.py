@@ -24,6 +24,7 @@ def unused(**given) -> dict[str, str]:
         ({"change_seed": 3}, "--change-seed", "--test-change"),
         ({"goal_walk_m": 0.5, "goal_only": True, "spacing_m": 0.1}, "--spacing-m", "--goal-only"),
         ({"spectrum": "insect"}, "--spectrum", "foreground-mask"),
+        ({"spectrum": "insect", "encoding": "green"}, "--spectrum", "green-channel"),
         ({"senses": "ant"}, "--senses", "scan"),
         ({"senses": "ant", "navigator": "lateral"}, "--senses", "lateral"),
         ({"model": "infomax", "navigator": "path-integration"}, "--model", "path-integration"),

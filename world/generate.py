@@ -17,7 +17,7 @@ from .herbs import culms, herb
 from .land import Land, land_of
 from .params import WorldParams
 from .pebbles import pebbles
-from .plant_groups import GroupsBuilder, PlantGroups
+from .plant_groups import GROUND, OTHER, GroupsBuilder, PlantGroups
 from .plant_parts import NO_PLANT, Plant, joined
 from .plants import bush, grass, leaf, stone, tree, tussock
 from .random_fields import PlaneFunction, random_field, random_ring
@@ -73,11 +73,12 @@ def generate_plants(params: WorldParams, seed: int, land: Land | None) -> tuple[
                 piece = SHAPES[kind](params, size, tone, streams[kind])
             groups.add(KINDS.get(kind, kind), np.array([(x, y)]), np.zeros(len(piece.rgb), np.int64))
             pieces.append(piece._replace(triangles=piece.triangles + np.array([x, y, 0], np.float32)))
-    covers = [hedge(params, streams["hedge"]), far_hills(params, streams["far_hills"])]
     if land is None:
-        covers = [speckles(params, streams["speckles"]), *covers]
-    groups.add_none(sum(len(cover.rgb) for cover in covers))
-    pieces += covers
+        pieces.append(speckles(params, streams["speckles"]))
+        groups.add_none(len(pieces[-1].rgb), GROUND)
+    around = [hedge(params, streams["hedge"]), far_hills(params, streams["far_hills"])]
+    groups.add_none(sum(len(piece.rgb) for piece in around), OTHER)
+    pieces += around
     if land is None:
         return joined(pieces), groups.build()
     below = [piece.triangles[..., :2].astype(np.float64) for piece in pieces]
@@ -85,7 +86,7 @@ def generate_plants(params: WorldParams, seed: int, land: Land | None) -> tuple[
         below[piece][:] = x, y
     raised = joined(pieces)
     raised = raised._replace(triangles=land.raised(raised.triangles, np.concatenate(below)))
-    groups.add_none(len(land.ground.rgb))
+    groups.add_none(len(land.ground.rgb), GROUND)
     return joined([raised, land.ground]), groups.build(land.height)
 
 

@@ -8,13 +8,18 @@ from jaxtyping import Float, Float32, Int, Int32, UInt8
 
 from .errors import SettingError
 
+GROUND, OTHER = (
+    -1,
+    -2,
+)  # in place of the number of a plant: the ground and what is painted on it; hedges, far hills, walls, new objects
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlantGroups:
     """Which triangles of a world are which plant. Stones and pieces of litter count as plants here. Immutable.
 
     Attributes:
-        of: (n,) number of the plant that each triangle belongs to; -1 for the ground, speckles and hedges.
+        of: (n,) number of the plant that each triangle belongs to; GROUND or OTHER where it belongs to none.
         kinds: Names of the kinds of plants, such as "tussock".
         kind: (plants,) the kind of each plant, as an index of `kinds`.
         foot: (plants, 3) where it stands: x, y, z (m).
@@ -30,7 +35,7 @@ class PlantGroups:
             raise SettingError(
                 f"{len(self.kind)} plants have a kind and {len(self.foot)} have a foot; give both of each"
             )
-        if len(self.of) and not -1 <= self.of.min() <= self.of.max() < len(self.kind):
+        if len(self.of) and not OTHER <= self.of.min() <= self.of.max() < len(self.kind):
             raise SettingError(f"triangles belong to plants {self.of.min()} to {self.of.max()} of {len(self.kind)}")
         if len(self.kind) and self.kind.max() >= len(self.kinds):
             raise SettingError(f"a plant is of kind {self.kind.max()}, and there are {len(self.kinds)} kinds")
@@ -59,9 +64,9 @@ class GroupsBuilder:
         self.kinds += [kind] * len(xy)
         self.foot.append(np.column_stack([xy, np.zeros(len(xy))]))
 
-    def add_none(self, count: int) -> None:
-        """Add triangles that belong to no plant."""
-        self.of.append(np.full(count, -1))
+    def add_none(self, count: int, what: int) -> None:
+        """Add triangles that belong to no plant: GROUND or OTHER."""
+        self.of.append(np.full(count, what))
 
     def build(self, height: Callable[[Float[np.ndarray, "n 2"]], Float[np.ndarray, " n"]] | None = None) -> PlantGroups:
         """The groups of all that was added. `height` gives that of the ground at positions (both m); None: it is flat."""
@@ -79,7 +84,7 @@ class GroupsBuilder:
 
 
 def no_plants(count: int) -> PlantGroups:
-    """The groups of triangles of which none is of a plant."""
+    """The groups of triangles of which none is of a plant or of the ground."""
     groups = GroupsBuilder()
-    groups.add_none(count)
+    groups.add_none(count, OTHER)
     return groups.build()

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from .errors import SettingError
-from .plant_groups import PlantGroups
+from .plant_groups import GROUND, OTHER, PlantGroups
 from .scene import World, once_per_world
 from .terrain import MAX_SLOPE, MIN_SHARE, Terrain, pieces
 
@@ -46,7 +46,7 @@ def _plants_of(world: World) -> PlantGroups:
             return world.plants
         under = np.unique(world.plants.of[ground & (world.plants.of >= 0)])
         return dataclasses.replace(
-            world.plants, of=np.where(np.isin(world.plants.of, under), -1, world.plants.of).astype(np.int32)
+            world.plants, of=np.where(np.isin(world.plants.of, under), GROUND, world.plants.of).astype(np.int32)
         )
     of = _loose_pieces(world, ground)
     count = int(of.max(initial=-1)) + 1
@@ -69,7 +69,7 @@ def is_ground(world: World) -> Bool[np.ndarray, " n"]:
 
 
 def _loose_pieces(world: World, ground: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
-    """The number of the piece of each triangle, -1 where it is ground."""
+    """The number of the piece of each triangle, OTHER where it is ground or wide."""
     corners = world.triangles.astype(np.float64)
     piece = pieces(corners)
     n = int(piece.max(initial=-1)) + 1
@@ -82,7 +82,7 @@ def _loose_pieces(world: World, ground: Bool[np.ndarray, " n"]) -> Int[np.ndarra
     size = world.field.size
     fixed = (high - low > MAX_WIDTH * size).any(axis=1) | (covered >= MIN_SHARE * size.prod())
     fixed[piece[ground]] = True
-    number = np.where(fixed, -1, np.cumsum(~fixed) - 1)
+    number = np.where(fixed, OTHER, np.cumsum(~fixed) - 1)
     return number[piece].astype(np.int32)
 
 
@@ -189,7 +189,7 @@ def without_plants(plants: PlantGroups, source: Int[np.ndarray, " m"]) -> PlantG
     left[of[of >= 0]] = True
     number = np.where(left, np.cumsum(left) - 1, -1)
     return PlantGroups(
-        of=np.where(of >= 0, number[of], -1).astype(np.int32),
+        of=np.where(of >= 0, number[np.maximum(of, 0)], of).astype(np.int32),
         kinds=plants.kinds,
         kind=plants.kind[left],
         foot=plants.foot[left],
@@ -239,19 +239,14 @@ def appended(
     """A world with more triangles, of one colour each, which are in no plant."""
     texturing, plants, k = world.texturing, _plants_of(world), len(rgb)
     if texturing is not None:
-        colours = texturing.colours
-        if colours is None:
-            colours = np.full((len(world.rgb), 3, 4), 255, np.uint8)
-            bare = texturing.index < 0
-            colours[bare, :, :3] = world.rgb[bare, None]
         own = np.concatenate([np.repeat(rgb[:, None], 3, axis=1), np.full((k, 3, 1), 255, np.uint8)], axis=2)
         texturing = dataclasses.replace(
             texturing,
             index=np.concatenate([texturing.index, np.full(k, -1, np.int32)]),
             uv=np.concatenate([texturing.uv, np.zeros((k, 3, 2), np.float32)]),
-            colours=np.concatenate([colours, own]),
+            colours=np.concatenate([texturing.corner_colours(world.rgb), own]),
         )
-    plants = dataclasses.replace(plants, of=np.concatenate([plants.of, np.full(k, -1, np.int32)]))
+    plants = dataclasses.replace(plants, of=np.concatenate([plants.of, np.full(k, OTHER, np.int32)]))
     changed = dataclasses.replace(
         world,
         triangles=np.concatenate([world.triangles, triangles]),

@@ -20,7 +20,7 @@ FIXED = {
     "light": "sun azimuth_deg=-20 elevation_deg=35", "model": "perfect-memory", "size": "360x75", "route-length-m": 4.0,
     "offset-m": 0.1, "heading-noise-deg": 10.0,
 }  # fmt: skip
-WORLDS, SEEDS = ["tussock-field", "meadow", "scrub"], [0, 1, 2, 3]
+WORLDS, SEEDS = ["tussock-field", "meadow", "scrub"], list(range(10))
 
 
 def measure(folder: Path) -> Values:

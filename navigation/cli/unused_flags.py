@@ -5,6 +5,8 @@ import logging
 from tussock.world.specs import takes
 
 from ..encoding_steps import ForegroundMask
+from ..encoding_steps_colour import GreenBlue
+from ..encoding_steps_ultraviolet import GreenChannel
 from ..experiment import Experiment
 from ..models.random import RandomHeadings
 from ..settings_table import read_settings
@@ -46,8 +48,8 @@ def unused_flags(experiment: Experiment) -> dict[str, str]:
     eye = experiment.eye
     if "overlap_deg" in given and eye.compound is not None and eye.compound.ommatidia().side.all():
         unused["overlap_deg"] = "with an eye whose ommatidia belong to a side"
-    if "spectrum" in given and isinstance(experiment.encoding.steps[0], ForegroundMask):
-        unused["spectrum"] = f"with the encoding {str(experiment.encoding)!r}, which sees only what is covered"
+    if "spectrum" in given and isinstance(experiment.encoding.steps[0], ForegroundMask | GreenChannel | GreenBlue):
+        unused["spectrum"] = f"with the encoding {str(experiment.encoding)!r}, which sees neither red nor ultraviolet"
     if experiment.training.goal_only:
         unused |= {name: "with --goal-only" for name in _OF_THE_ROUTE if name in given}
     navigator, name = experiment.navigator, str(experiment.navigator)

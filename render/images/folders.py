@@ -112,7 +112,7 @@ def _recorded_eye(database: Database) -> dict[str, Any]:
     recorded = group_in(database.metadata, "tussock", "eye")
     if not recorded:
         height, width = first_view(database).shape[:2]
-        return {"width": width, "height": height, "spectrum": HUMAN}
+        return {"width": width, "height": height}
     names = {each.name for each in attrs.fields(Eye)}
     try:
         if unknown := recorded.keys() - names:
