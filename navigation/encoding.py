@@ -261,6 +261,9 @@ def parameters_of(step: Any) -> list[float]:
 
 def _parse_step(part: str, importing: bool) -> Any:
     name, *texts = part.split() or [""]
+    if name in PRESETS and name not in STEPS:
+        chain = PRESETS[name].format(blur="", resize="").rstrip(" |")
+        raise SettingError(f"{name} is a preset, which stands alone (--resize reduces it); as a chain it is '{chain}'")
     kind = STEPS.find(OLD_NAMES.get(name, name), importing=importing)
     names = list(signature_of(kind).parameters)
     try:

@@ -250,6 +250,8 @@ class Surroundings:
 
         if self.posture.gaze == "body" and world.terrain is None:
             _remark_on_flat_ground()
+        if self.eye.z < 0 and world.ground is not None:
+            log.warning("the eye is %g m under the ground: give --eye-height-m over 0", -self.eye.z)
         renderer = open_renderer(world, self.eye, self.renderer, threads=self.threads)
         if mount is not None and mount != type(mount)():
             from tussock.render.mounted_eye import MountedEye

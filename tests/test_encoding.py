@@ -217,6 +217,7 @@ def test_presets_are_chains(name, views):
     ("text", "parts"),
     [
         ("edge", ("'edge'", "grey, sky, edges, green, uv, uv-green")),
+        ("uv | resize 3", ("uv is a preset, which stands alone", "'ultraviolet 0.05'")),
         ("blur 2 | grey", ("'blur'", "after one that takes views")),
         ("grey | sharpen", ("'sharpen'", "blur, resize", "package.module:Class")),
         ("grey | grey", ("'grey'", "at the beginning only")),

@@ -51,7 +51,7 @@ DIGESTS = {
     "tussock-2": "71c2f5d9b5c3f8504a8a885bacb00cdd88cd308d88832c1fb1288d99e0823757",
     "tussock-2-quick": "ad70ca16e4ff30954f4428cbdf4f993e16f8b7c8eae10edd59f8c47696666f72",
     "tussock-3": "4ff0abe6c54c06b3352f421a0f40744db30d6503c34c7402de73378b2c625af5",
-    "tussock-3-quick": "e7112e1499171a461eaa24f9307929a267ca7c28b7288153915df6ff824adf14",
+    "tussock-3-quick": "7dcb05ed8e5b60a9ba204afe49628217ab3216514e646c960de7ccbbfde324dd",
 }
 
 

@@ -426,3 +426,8 @@ def test_a_walk_learns_in_the_morning_and_walks_at_noon():
         assert torch.equal(one.views, other.views)
         assert other.renderer.world.light.elevation > one.renderer.world.light.elevation + 0.3
         assert np.array_equal(one.route.xy, other.route.xy)
+
+
+def test_parameters_of_a_light_are_named_as_they_are_given():
+    with pytest.raises(SettingError, match="its parameters are azimuth_deg, elevation_deg, clouds, latitude_deg"):
+        light_spec("sun azimut_deg=3")

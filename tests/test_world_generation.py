@@ -502,3 +502,12 @@ def test_a_short_route_is_found_among_dense_plants():
 def test_a_bad_length_is_refused(length):
     with pytest.raises(InputError, match="length"):
         generate_route(generated("tiny", 1), 0, length=length)
+
+
+def test_a_route_that_is_shorter_than_was_asked_for_says_so(caplog):
+    world = World.generate("tiny", 1)
+    assert generate_route(world, 1, length=100.0).length == pytest.approx(3.39, abs=0.05)
+    assert "a route of 100 m does not fit into the field" in caplog.text
+    caplog.clear()
+    generate_route(world, 1)
+    assert caplog.text == ""

@@ -5,6 +5,8 @@ world's mesh (`World.on_mesh`), the ground is not an obstacle, heights are those
 off its edge. Lengths are measured over the x-y plane.
 """
 
+import logging
+
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
@@ -17,7 +19,10 @@ from .origin import shown
 from .paths import CELL, MARGIN, MIN_CLEARANCE, PREFERRED_CLEARANCE, Paths
 from .scene import World
 
+log = logging.getLogger(__name__)
+
 MIN_LENGTH = 0.1  # m of a route
+USUAL_LENGTH = 8.0  # m
 SPACING = 0.01  # m between points of a route
 MAX_TURN = np.radians(30)  # of a route within 2 cm
 MAX_ATTEMPTS = 60
@@ -26,7 +31,9 @@ MAX_CHECKED = 10**6  # points of a route
 MAX_CELLS = 4 * 10**7  # of the grid: a field of 126 m x 126 m
 
 
-def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[float, ...] | None = None) -> Route:
+def generate_route(
+    world: World, seed: int, length: float = USUAL_LENGTH, goal: tuple[float, ...] | None = None
+) -> Route:
     """Generate a smooth route with 2 to 4 corners through a world. The same world and seed give the same bytes.
 
     The route stays 5 % of the field's shorter side (at most 0.3 m) inside the field, and MIN_CLEARANCE away from all obstacles
@@ -44,7 +51,10 @@ def generate_route(world: World, seed: int, length: float = 8.0, goal: tuple[flo
     """
     check_length(length)
     rng, field = seeded(seed), world.field
-    length = min(float(length), 0.8 * float(np.hypot(*field.size)))
+    longest = 0.8 * float(np.hypot(*field.size))
+    if length > longest and length != USUAL_LENGTH:
+        log.warning("a route of %g m does not fit into the field (%s); this one is %.2f m long", length, field, longest)
+    length = min(float(length), longest)
     if np.prod(field.size / CELL + 2 * MARGIN) > MAX_CELLS:
         of_a_file = "" if world.origin else " (or the unit of the file, such as --unit mm)"
         raise InputError(

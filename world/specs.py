@@ -128,7 +128,11 @@ def parse_parameters(words: list[str], name: str, target: Callable[..., Any]) ->
         if key in RESERVED:
             raise SettingError(f"{key} cannot be part of {name!r}; give it as --{key}, in Python as {key}=")
         if not takes(target, key):
-            raise SettingError(f"{name} has no parameter {key!r}; its parameters are {', '.join(own) or 'none'}")
+            angles = {
+                each.name for each in getattr(target, "__attrs_attrs__", ()) if each.metadata.get("unit") == "rad"
+            }
+            names = [f"{each}_deg" if each in angles else each for each in own]
+            raise SettingError(f"{name} has no parameter {key!r}; its parameters are {', '.join(names) or 'none'}")
         if key in parameters:
             raise SettingError(f"{key} is given twice; give it once")
         parameters[key] = _radians(word, value, own.get(key)) if in_degrees else parse_value(value, own.get(key))

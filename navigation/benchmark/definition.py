@@ -216,7 +216,7 @@ TUSSOCK_3 = Benchmark(
     base=BASE.replace(light=MORNING),
     conditions=CONDITIONS,
 )
-QUICK_3 = replace(TUSSOCK_3, name="tussock-3-quick", worlds=_worlds(1), noises_deg=(0.0,), displacements=(0.3,))
+QUICK_3 = replace(TUSSOCK_3, name="tussock-3-quick", worlds=_worlds(1), noises_deg=(20.0,), displacements=(0.3,))
 BENCHMARKS = {each.name: each for each in (BENCHMARK, QUICK, TUSSOCK_3, QUICK_3)}
 
 

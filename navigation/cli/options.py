@@ -241,7 +241,7 @@ class RunOptions(ChangeOptions):
     """Radius of the body, which may not enter what it touches."""
     senses: str = default(Experiment, "senses")
     """How well the agent measures its heading and the distance it walks: ideal, robot, svo-gtsam, stankiewicz-webb, ant or bee, with their
-    published noise; parameters may follow, as in 'ant compass_deg=10 speed=0.2'."""
+    published noise, or dorsal-rim, a compass in the sky (docs/light.md); parameters may follow, as in 'ant compass_deg=10 speed=0.2'."""
     release_m: float = default(Experiment, "release")
     """Start this far from the end of the route, facing it, in place of the start of the route; 0 is there."""
     release_deg: float = degrees(default(Experiment, "release_direction"))

@@ -88,6 +88,8 @@ def run_sweep(
             raise
         table = _write_table(store, out)
     table = table[table["key"].isin(runs)]
+    if len(failed := table["error"].dropna()):
+        log.warning("%d runs could not be made; the first: %s", len(failed), failed.iloc[0])
     return {
         "table": str(out / TABLE),
         "runs": len(runs),
