@@ -114,7 +114,7 @@ ULTRAVIOLET_STEPS = (GreenChannel, *SHOWN)
 
 def of_insects(step: EncodingStep) -> EncodingStep:
     """A step for views that show the ultraviolet in place of red. Raises SettingError for a number that would then mean nothing."""
-    if type(step) not in SHOWN:
+    if not isinstance(step, Ultraviolet) or type(step) not in SHOWN:
         return step
     share = f"{step.reflectance:g}"
     if step.reflectance != REFLECTANCE:
