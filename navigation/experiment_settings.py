@@ -176,12 +176,12 @@ def _eye(given: Mapping[str, Any], known: Eye | None, surroundings: Surroundings
 
         eye = eye_of(surroundings.route_database, surroundings.grid_database, fields)
     if known is not None and eye != known:
-        raise SettingError(f"{given['model']} learned through another eye: {_differences(known, eye, given)}train anew")
+        raise SettingError(f"{given['model']} learned through another eye: {_differences(known, eye, given)}")
     return eye
 
 
 def _differences(known: Eye, asked: Eye, given: Mapping[str, Any]) -> str:
-    """In what two eyes differ, and which of the given settings make it so."""
+    """In what two eyes differ, and what to do: leave out the given settings that make it so, or train anew."""
     flags = {field.removeprefix("eye."): name for name, field in FIELDS.items()} | {"width": "size", "height": "size"}
     differing = [each for each in attrs.fields(Eye) if getattr(known, each.name) != getattr(asked, each.name)]
     values = [
@@ -189,7 +189,7 @@ def _differences(known: Eye, asked: Eye, given: Mapping[str, Any]) -> str:
     ]
     names = dict.fromkeys(flags[each.name] for each in differing if given.get(flags.get(each.name, "")) is not None)
     leave = f"leave out {', '.join('--' + name.replace('_', '-') for name in names)}, or " if names else ""
-    return f"{', '.join(values[0])}, not {', '.join(values[1])}; {leave}"
+    return f"{', '.join(values[0])}, not {', '.join(values[1])}; {leave}train anew"
 
 
 def width_and_height(size: str) -> tuple[int, int]:

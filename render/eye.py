@@ -52,8 +52,8 @@ class Eye:
         known: Which pixels of a recorded image show the world, given as `mask` is: not those behind the body of the robot, or beyond
             the field of its camera. None means all.
         compound: The ommatidia of a compound eye, which see parts of the panorama (`compound_eye`). None: the pixels are what it sees.
-        spectrum: "human": views show red, green and blue. "insect": they show ultraviolet in place of red; "insect ground=0.2" says
-            how much of it something reflects (see `Insect`).
+        spectrum: "human": views show red, green and blue. "insect": they show ultraviolet in place of red; "insect ground=0.2" gives
+            the share of it that a material reflects (see `Insect`).
     """
 
     width: int = whole(720, low=4, high=32768, unit="pixels")

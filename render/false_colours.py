@@ -23,14 +23,15 @@ def seen_colours(world: World, spectrum: str) -> World:
     insect = insect_of(spectrum)
     if insect is None:
         return world
-    kept = _kept(world)
+    kept = _by_spectrum(world)
     if spectrum not in kept:
         kept[spectrum] = _in_ultraviolet(world, insect)
     return kept[spectrum]
 
 
 @once_per_world
-def _kept(world: World) -> dict[str, World]:
+def _by_spectrum(world: World) -> dict[str, World]:
+    """The colours of a world that were made already; kept as long as the world."""
     return {}
 
 
@@ -60,13 +61,13 @@ def _in_ultraviolet(world: World, insect: Insect) -> World:
 
 def reflected(world: World, insect: Insect) -> Float[np.ndarray, " n"]:
     """The share of the ultraviolet that each triangle of a world reflects."""
-    shares = np.full(len(world.triangles), insect.other)
+    groups = world.plants
+    if groups is None:
+        return np.full(len(world.triangles), insect.other)
     shares_of = {"stone": insect.stones, "pebble": insect.stones, PIECE: insect.other}
-    if (groups := world.plants) is not None:
-        of_kind = np.array([shares_of.get(kind, insect.plants) for kind in groups.kinds])
-        shares[groups.of == GROUND] = insect.ground
-        plants = groups.of >= 0
-        shares[plants] = of_kind[groups.kind[groups.of[plants]]]
+    of_kind = np.array([shares_of.get(kind, insect.plants) for kind in groups.kinds], dtype=float)
+    shares = groups.per_triangle(of_kind[groups.kind], insect.other)
+    shares[groups.of == GROUND] = insect.ground
     return shares
 
 
@@ -79,6 +80,7 @@ def _shading(world: World) -> Float[np.ndarray, " n"]:
 
 
 def _display(shares: Float[np.ndarray, "..."]) -> UInt8[np.ndarray, "..."]:
+    """Shares of light as display values; over 1 as 1."""
     return np.rint(255 * to_display(np.clip(shares, 0, 1))).astype(np.uint8)
 
 

@@ -57,6 +57,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
 
 
+@pytest.fixture(params=["egl", "osmesa"])
+def backend(request) -> str:
+    """A backend of OpenGL that this process can use."""
+    from tussock.render import gl
+    from tussock.world.errors import InputError
+
+    name = request.param
+    if gl.bound_backend() not in (None, name):
+        pytest.skip(f"this process is bound to {gl.bound_backend()}; {name} runs in another process")
+    try:
+        gl.open_context(name)
+    except InputError as error:
+        if os.environ.get("TUSSOCK_REQUIRE_GL") == "1":
+            pytest.fail(f"TUSSOCK_REQUIRE_GL=1, but {error}")
+        pytest.skip(str(error))
+    return name
+
+
 @pytest.fixture(scope="session")
 def sussex() -> Path:
     """The folder of the original world and routes."""

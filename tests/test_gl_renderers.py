@@ -33,21 +33,6 @@ SKY, SAND = (191, 191, 191), (229, 183, 90)
 HERE = Pose(0.0, 0.0, 0.3)
 
 
-@pytest.fixture(params=BACKENDS)
-def backend(request):
-    """A backend that this process can use."""
-    name = request.param
-    if gl.bound_backend() not in (None, name):
-        pytest.skip(f"this process is bound to {gl.bound_backend()}; {name} runs in another process")
-    try:
-        gl.open_context(name)
-    except InputError as error:
-        if os.environ.get("TUSSOCK_REQUIRE_GL") == "1":
-            pytest.fail(f"TUSSOCK_REQUIRE_GL=1, but {error}")
-        pytest.skip(str(error))
-    return name
-
-
 @pytest.fixture(scope="module")
 def sussex_world(sussex):
     return read_world(sussex / "world5000_gray.bin")
@@ -341,10 +326,15 @@ def test_cube_faces_follow_the_eye():
 )
 @pytest.mark.parametrize("name", BACKENDS)
 def test_backend_in_its_own_process(name, some):
-    """The tests of a backend that this process cannot use run in another process: a few with the quick tests, all with the slow ones."""
+    """The tests of a backend that this process cannot use run in another process: a few with the quick tests, all with the slow ones.
+
+    All are those of each file that takes the fixture `backend`.
+    """
     if name == (gl.bound_backend() or BACKENDS[0]):
         pytest.skip(f"{name} runs in this process")
-    command = [sys.executable, "-m", "pytest", __file__, "-k", f"{name} and not own_process {some}"]
+    here = Path(__file__)
+    files = [here] if some else [path for path in here.parent.glob("test_*.py") if "(backend" in path.read_text()]
+    command = [sys.executable, "-m", "pytest", *files, "-k", f"{name} and not own_process {some}"]
     command += ["-p", "no:cacheprovider", *([] if some else ["-m", ""])]
     done = subprocess.run(
         command, capture_output=True, text=True, cwd=Path(__file__).parents[1], timeout=300, check=False

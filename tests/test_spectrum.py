@@ -118,13 +118,8 @@ def test_sun_and_shadow_are_those_of_a_white_world():
         assert np.array_equal(one.render(poses)[..., 0], other.render(poses)[..., 0])
 
 
-@pytest.mark.parametrize("backend", ["egl", "osmesa"])
 @pytest.mark.parametrize("light", [None, Light()])
 def test_the_renderers_agree(backend, light):
-    from tussock.render import gl
-
-    if gl.bound_backend() not in (None, backend):
-        pytest.skip(f"this process is bound to {gl.bound_backend()}; {backend} runs in another process")
     worlds = [World.generate("tiny", 1), textured_world([random_texture(1), random_texture(2)])]
     for world in worlds if light is None else [lit(world, light) for world in worlds]:
         poses = full_poses(world.field, 3)

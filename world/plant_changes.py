@@ -133,7 +133,7 @@ def _rows_of(plants: PlantGroups, chosen: np.ndarray) -> tuple[np.ndarray, np.nd
     """The triangles of some plants, and the place of the plant of each among these."""
     place = np.full(len(plants), -1)
     place[chosen] = np.arange(len(chosen))
-    of = np.where(plants.of >= 0, place[np.maximum(plants.of, 0)], -1) if len(plants) else plants.of
+    of = plants.per_triangle(place, -1)
     rows = np.flatnonzero(of >= 0)
     return rows, of[rows]
 

@@ -2,16 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, Int32, UInt8
+from jaxtyping import Float, Float32, Int, Int32, Shaped, UInt8
 
 from .errors import SettingError
 
-GROUND, OTHER = (
-    -1,
-    -2,
-)  # in place of the number of a plant: the ground and what is painted on it; hedges, far hills, walls, new objects
+# In place of the number of a plant:
+GROUND = -1  # the ground, and what lies flat on it
+OTHER = -2  # hedges, far hills, walls, new objects, and what is not known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,6 +42,13 @@ class PlantGroups:
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def per_triangle(self, values: Shaped[np.ndarray, " plants"], otherwise: Any) -> Shaped[np.ndarray, " n"]:
+        """Values of the plants, for each triangle that of its plant; `otherwise` where it belongs to none."""
+        spread = np.full(len(self.of), otherwise, values.dtype)
+        inside = self.of >= 0
+        spread[inside] = values[self.of[inside]]
+        return spread
 
 
 @dataclass

@@ -22,7 +22,7 @@ from .scene import World
 log = logging.getLogger(__name__)
 
 MIN_LENGTH = 0.1  # m of a route
-USUAL_LENGTH = 8.0  # m
+USUAL_LENGTH = 8.0  # m; nobody is told where it does not fit into a small field, as nobody asked for it
 SPACING = 0.01  # m between points of a route
 MAX_TURN = np.radians(30)  # of a route within 2 cm
 MAX_ATTEMPTS = 60

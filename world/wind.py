@@ -145,7 +145,7 @@ def _by_law(
     laws = []
     for is_slender, by_blade in ((True, True), (True, False), (False, False)):
         chosen = (slender == is_slender) & (blades == by_blade) & (angle > 0)
-        rows = np.flatnonzero((plants.of >= 0) & chosen[np.maximum(plants.of, 0)])
+        rows = np.flatnonzero(plants.per_triangle(chosen, False))
         if len(rows) == 0:
             continue
         of = plants.of[rows]

@@ -97,7 +97,7 @@ class ViewOptions(MeshOptions):
     panorama, or the model file's."""
     spectrum: Annotated[str | None, tyro.conf.arg(metavar="human|insect")] = None
     """human: views show red, green and blue. insect: they show ultraviolet in place of red, for the encodings uv and uv-green;
-    'insect ground=0.2' says how much of it sand reflects (docs/eyes.md). Default: human, or the model file's."""
+    'insect ground=0.2' gives the share of it that the ground reflects, as of sand (docs/eyes.md). Default: human, or the model file's."""
     cull_back_faces: bool = default(Surroundings, "cull_back_faces")
     """See triangles only from their front, as the original Sussex renderer did."""
     light: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
